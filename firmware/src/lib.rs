@@ -1,0 +1,2 @@
+//! The simulator as firmware, without a board.
+#![no_std]
