@@ -1,0 +1,380 @@
+//! The process image: every signal between the winder PLC and the simulator, defined once.
+//!
+//! Not here: how a signal travels (that is a link's) and what it does (that is the logic's). Modbus registers,
+//! the HMI's interface and the signal list all come from [`SIGNALS`].
+//!
+//! Two blocks of 16-bit words, commands from the PLC and feedback to it, without holes. A value is a scaled
+//! integer; a 32-bit counter takes two words, high word first. Bit `b` of word `w` is also the single bit
+//! `16·w + b` of the block, so that a PLC can use coils or words as it likes.
+
+use crate::logic;
+use crate::machine::Machine;
+use crate::profidrive;
+use crate::real::Real;
+
+/// Who writes a signal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// From the winder PLC to the simulator.
+    Command,
+    /// From the simulator to the winder PLC.
+    Feedback,
+}
+
+/// The part of the machine a signal belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Section {
+    /// The winder as a whole.
+    Winder,
+    /// The unwind and its drive.
+    Unwind,
+    /// The rear drum and its drive.
+    RearDrum,
+    /// The front drum and its drive.
+    FrontDrum,
+    /// The rider roll and its drive.
+    RiderRoll,
+    /// The simulator itself: what no real winder has.
+    Simulator,
+}
+
+impl Section {
+    /// The name in lists.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Section::Winder => "winder",
+            Section::Unwind => "uw",
+            Section::RearDrum => "rd",
+            Section::FrontDrum => "fd",
+            Section::RiderRoll => "rr",
+            Section::Simulator => "simulator",
+        }
+    }
+}
+
+/// A named bit of a word.
+#[derive(Clone, Copy, Debug)]
+pub struct Bit {
+    /// Number, 0 the least significant.
+    pub number: u8,
+    /// Name, appended to the word's.
+    pub name: &'static str,
+    /// What 1 means.
+    pub description: &'static str,
+}
+
+/// How a signal stands in its words.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    /// An unsigned scaled integer.
+    U16,
+    /// A signed scaled integer, two's complement.
+    I16,
+    /// An unsigned 32-bit integer in two words, high word first; a counter wraps.
+    U32,
+    /// Single bits.
+    Bits(&'static [Bit]),
+    /// A code; the index is the value.
+    Code(&'static [&'static str]),
+}
+
+impl Kind {
+    /// The name in lists.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Kind::U16 => "u16",
+            Kind::I16 => "i16",
+            Kind::U32 => "u32",
+            Kind::Bits(_) => "bits",
+            Kind::Code(_) => "code",
+        }
+    }
+    /// The words it takes.
+    pub const fn words(self) -> u16 {
+        match self {
+            Kind::U32 => 2,
+            _ => 1,
+        }
+    }
+}
+
+/// One signal of the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Signal {
+    /// Name, unique.
+    pub name: &'static str,
+    /// Who writes it.
+    pub direction: Direction,
+    /// The part of the machine it belongs to.
+    pub section: Section,
+    /// How it stands in its words.
+    pub kind: Kind,
+    /// Unit of the scaled value.
+    pub unit: &'static str,
+    /// Counts for one unit: 10 means that 1 count is 0.1 unit.
+    pub counts: f32,
+    /// Smallest and largest value, in the unit. A set-point outside is limited, as a drive does.
+    pub limits: (f32, f32),
+    /// First word in the block of its direction.
+    pub word: u16,
+    /// What it means, in a sentence.
+    pub description: &'static str,
+}
+
+const fn lower<const N: usize>(name: &str) -> [u8; N] {
+    let (mut out, bytes, mut i) = ([0; N], name.as_bytes(), 0);
+    while i < N {
+        out[i] = bytes[i].to_ascii_lowercase();
+        i += 1;
+    }
+    out
+}
+
+/// Writes the constants and their list from one table.
+macro_rules! signals {
+    ($($id:ident: $dir:ident $word:literal, $section:ident, $kind:expr, $unit:literal, $counts:literal, $low:literal ..= $high:literal, $text:literal;)*) => {
+        $(
+            #[doc = $text]
+            pub const $id: Signal = {
+                const NAME: [u8; stringify!($id).len()] = lower(stringify!($id));
+                Signal {
+                    name: match core::str::from_utf8(&NAME) { Ok(name) => name, Err(_) => "" },
+                    direction: Direction::$dir,
+                    section: Section::$section,
+                    kind: $kind,
+                    unit: $unit,
+                    counts: $counts,
+                    limits: ($low, $high),
+                    word: $word,
+                    description: $text,
+                }
+            };
+        )*
+        /// Every signal, in the order of its words, commands first.
+        pub const SIGNALS: &[Signal] = &[$($id),*];
+    };
+}
+
+use Kind::{Bits, Code, I16, U16, U32};
+
+signals! {
+    // what the PLC commands
+    HEARTBEAT_PLC:    Command 0,  Winder, U16, "", 1.0, 0.0 ..= 65535.0, "Counts up while the PLC lives; when it stands still the drives stop (drives on) after the heartbeat time";
+    WINDER_COMMAND:   Command 1,  Winder, Bits(logic::COMMAND_BITS), "", 1.0, 0.0 ..= 65535.0, "Commands to the winder's drive logic";
+    STW1_UW:          Command 2,  Unwind, Bits(profidrive::STW1_BITS), "", 1.0, 0.0 ..= 65535.0, "PROFIdrive control word 1 of the unwind";
+    STW1_RD:          Command 3,  RearDrum, Bits(profidrive::STW1_BITS), "", 1.0, 0.0 ..= 65535.0, "PROFIdrive control word 1 of the rear drum";
+    STW1_FD:          Command 4,  FrontDrum, Bits(profidrive::STW1_BITS), "", 1.0, 0.0 ..= 65535.0, "PROFIdrive control word 1 of the front drum";
+    STW1_RR:          Command 5,  RiderRoll, Bits(profidrive::STW1_BITS), "", 1.0, 0.0 ..= 65535.0, "PROFIdrive control word 1 of the rider roll";
+    V_SET:            Command 6,  Winder, U16, "m/min", 10.0, 0.0 ..= 2500.0, "Web speed to run at";
+    V_THREAD_SET:     Command 7,  Winder, U16, "m/min", 10.0, 5.0 ..= 60.0, "Web speed to thread at";
+    TENSION_SET:      Command 8,  Winder, U16, "N/m", 1.0, 50.0 ..= 1000.0, "Web tension per width in run";
+    STALL_SET:        Command 9,  Winder, U16, "N/m", 1.0, 20.0 ..= 500.0, "Web tension per width at standstill and in thread";
+    ACCEL_SET:        Command 10, Winder, U16, "m/s²", 1000.0, 0.05 ..= 1.0, "Acceleration and normal deceleration";
+    JERK_SET:         Command 11, Winder, U16, "m/s³", 1000.0, 0.05 ..= 2.0, "Rate of change of the acceleration";
+    D_PRESET_UW:      Command 12, Unwind, U16, "mm", 10.0, 100.0 ..= 4000.0, "Parent-roll diameter that the drive takes over with preset_accept";
+    TORQUE_LIMIT_UW:  Command 13, Unwind, U16, "%", 10.0, 0.0 ..= 150.0, "Torque limit of the unwind motor, of rated torque";
+    TORQUE_LIMIT_DRUMS: Command 14, RearDrum, U16, "%", 10.0, 0.0 ..= 150.0, "Torque limit of both drum motors, of rated torque";
+    FRONT_SHARE_TRIM: Command 15, FrontDrum, I16, "%", 10.0, -20.0 ..= 20.0, "Added to the drive's own table of the front drum's share of the drum torque";
+
+    // what the drive system answers
+    HEARTBEAT:        Feedback 0,  Winder, U16, "", 1.0, 0.0 ..= 65535.0, "Counts up by one each drive cycle of 10 ms";
+    WINDER_STATUS:    Feedback 1,  Winder, Bits(logic::STATUS_BITS), "", 1.0, 0.0 ..= 65535.0, "State of the winder's drive logic";
+    MODE:             Feedback 2,  Winder, Code(logic::Mode::NAMES), "", 1.0, 0.0 ..= 65535.0, "Operating mode";
+    REFUSAL:          Feedback 3,  Winder, Code(logic::Refusal::NAMES), "", 1.0, 0.0 ..= 65535.0, "Why the last command was refused; 0 when the last one was taken";
+    FAULT:            Feedback 4,  Winder, Code(logic::Fault::NAMES), "", 1.0, 0.0 ..= 65535.0, "First fault that is latched; cleared by an acknowledge";
+    ZSW1_UW:          Feedback 5,  Unwind, Bits(profidrive::ZSW1_BITS), "", 1.0, 0.0 ..= 65535.0, "PROFIdrive status word 1 of the unwind";
+    ZSW1_RD:          Feedback 6,  RearDrum, Bits(profidrive::ZSW1_BITS), "", 1.0, 0.0 ..= 65535.0, "PROFIdrive status word 1 of the rear drum";
+    ZSW1_FD:          Feedback 7,  FrontDrum, Bits(profidrive::ZSW1_BITS), "", 1.0, 0.0 ..= 65535.0, "PROFIdrive status word 1 of the front drum";
+    ZSW1_RR:          Feedback 8,  RiderRoll, Bits(profidrive::ZSW1_BITS), "", 1.0, 0.0 ..= 65535.0, "PROFIdrive status word 1 of the rider roll";
+    V_WEB:            Feedback 9,  Winder, I16, "m/min", 10.0, -3276.7 ..= 3276.7, "Web speed, from the rear drum's encoder";
+    V_REF:            Feedback 10, Winder, I16, "m/min", 10.0, -3276.7 ..= 3276.7, "Web speed reference after the ramp";
+    A_REF:            Feedback 11, Winder, I16, "m/s²", 1000.0, -32.767 ..= 32.767, "Acceleration of the speed reference";
+    TENSION:          Feedback 12, Winder, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Measured web tension per width (load cells on a slitter-table roll)";
+    TENSION_REF:      Feedback 13, Winder, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Web tension reference per width after its ramp";
+    N_UW:             Feedback 14, Unwind, I16, "1/min", 10.0, -3276.7 ..= 3276.7, "Speed of the parent roll";
+    N_RD:             Feedback 15, RearDrum, I16, "1/min", 10.0, -3276.7 ..= 3276.7, "Speed of the rear drum";
+    N_FD:             Feedback 16, FrontDrum, I16, "1/min", 10.0, -3276.7 ..= 3276.7, "Speed of the front drum";
+    N_RR:             Feedback 17, RiderRoll, I16, "1/min", 10.0, -3276.7 ..= 3276.7, "Speed of the rider roll";
+    TORQUE_UW:        Feedback 18, Unwind, I16, "%", 10.0, -3276.7 ..= 3276.7, "Motor torque of the unwind, of rated torque; negative holds the web back";
+    TORQUE_RD:        Feedback 19, RearDrum, I16, "%", 10.0, -3276.7 ..= 3276.7, "Motor torque of the rear drum, of rated torque";
+    TORQUE_FD:        Feedback 20, FrontDrum, I16, "%", 10.0, -3276.7 ..= 3276.7, "Motor torque of the front drum, of rated torque";
+    TORQUE_RR:        Feedback 21, RiderRoll, I16, "%", 10.0, -3276.7 ..= 3276.7, "Motor torque of the rider roll, of rated torque";
+    POWER_UW:         Feedback 22, Unwind, I16, "kW", 10.0, -3276.7 ..= 3276.7, "Shaft power of the unwind motor; negative is fed back to the line";
+    POWER_RD:         Feedback 23, RearDrum, I16, "kW", 10.0, -3276.7 ..= 3276.7, "Shaft power of the rear drum motor";
+    POWER_FD:         Feedback 24, FrontDrum, I16, "kW", 10.0, -3276.7 ..= 3276.7, "Shaft power of the front drum motor";
+    POWER_RR:         Feedback 25, RiderRoll, I16, "kW", 10.0, -3276.7 ..= 3276.7, "Shaft power of the rider roll motor";
+    D_UW:             Feedback 26, Unwind, U16, "mm", 10.0, 0.0 ..= 6553.5, "Parent-roll diameter as the drive estimates it";
+    D_WU:             Feedback 27, Winder, U16, "mm", 10.0, 0.0 ..= 6553.5, "Shipping-roll diameter, from the position of the rider-roll beam";
+    LENGTH_WU:        Feedback 28, Winder, U32, "m", 100.0, 0.0 ..= 42949672.0, "Length on the shipping roll, from the rear drum's encoder";
+    PULSES_RD:        Feedback 30, RearDrum, U32, "", 1.0, 0.0 ..= 4294967295.0, "Encoder pulses of the rear drum since power-up; wraps";
+
+    // what the simulator tells of itself
+    PLANT_TICKS:      Feedback 32, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Plant steps of 4 ms since power-up; wraps";
+    TRAJECTORY:       Feedback 34, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Hash over every plant state of every step: equal runs have equal hashes";
+    PLANT_OVERRUNS:   Feedback 36, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Plant activations not done before the next was due";
+    PLANT_TIME_MAX:   Feedback 37, Simulator, U16, "µs", 1.0, 0.0 ..= 65535.0, "Longest plant activation";
+    PLANT_JITTER_MAX: Feedback 38, Simulator, U16, "µs", 1.0, 0.0 ..= 65535.0, "Latest start of a plant activation";
+    DRIVE_OVERRUNS:   Feedback 39, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Regulator activations not done before the next was due";
+    DRIVE_TIME_MAX:   Feedback 40, Simulator, U16, "µs", 1.0, 0.0 ..= 65535.0, "Longest regulator activation";
+    DRIVE_JITTER_MAX: Feedback 41, Simulator, U16, "µs", 1.0, 0.0 ..= 65535.0, "Latest start of a regulator activation";
+    LOGIC_OVERRUNS:   Feedback 42, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Drive cycles in which the drive logic did not get its turn";
+}
+
+/// Words in the block of commands.
+pub const COMMAND_WORDS: usize = block_words(Direction::Command);
+/// Words in the block of feedback.
+pub const FEEDBACK_WORDS: usize = block_words(Direction::Feedback);
+
+const fn block_words(direction: Direction) -> usize {
+    let (mut words, mut i) = (0, 0);
+    while i < SIGNALS.len() {
+        let s = &SIGNALS[i];
+        let end = s.word + s.kind.words();
+        if s.direction as u8 == direction as u8 && end > words {
+            words = end;
+        }
+        i += 1;
+    }
+    words as usize
+}
+
+/// One block of words; always a whole, consistent set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block<const N: usize> {
+    /// The words as they travel.
+    pub words: [u16; N],
+}
+
+/// What the PLC commands.
+pub type Commands = Block<COMMAND_WORDS>;
+/// What the simulator answers.
+pub type Feedback = Block<FEEDBACK_WORDS>;
+
+impl<const N: usize> Default for Block<N> {
+    fn default() -> Self {
+        Self { words: [0; N] }
+    }
+}
+
+impl<const N: usize> Block<N> {
+    /// The word of a signal as it travels.
+    pub fn word(&self, signal: &Signal) -> u16 {
+        self.words[usize::from(signal.word)]
+    }
+
+    /// Both words of a 32-bit signal.
+    pub fn double(&self, signal: &Signal) -> u32 {
+        let w = usize::from(signal.word);
+        u32::from(self.words[w]) << 16 | u32::from(self.words[w + 1])
+    }
+
+    /// The value in the signal's unit, within its limits.
+    pub fn get<R: Real>(&self, signal: &Signal) -> R {
+        let raw = match signal.kind {
+            Kind::I16 => f64::from(self.word(signal) as i16),
+            Kind::U32 => f64::from(self.double(signal)),
+            _ => f64::from(self.word(signal)),
+        };
+        let (low, high) = signal.limits;
+        R::of((raw / f64::from(signal.counts)).clamp(f64::from(low), f64::from(high)))
+    }
+
+    /// Sets the word as it travels.
+    pub fn set_word(&mut self, signal: &Signal, word: u16) {
+        self.words[usize::from(signal.word)] = word;
+    }
+
+    /// Sets both words of a 32-bit signal.
+    pub fn set_double(&mut self, signal: &Signal, value: u32) {
+        let w = usize::from(signal.word);
+        self.words[w] = (value >> 16) as u16;
+        self.words[w + 1] = value as u16;
+    }
+
+    /// Sets the value, in the signal's unit, to the nearest count within its limits.
+    pub fn set<R: Real>(&mut self, signal: &Signal, value: R) {
+        let (low, high) = signal.limits;
+        let value =
+            value.to_f64().clamp(f64::from(low), f64::from(high)) * f64::from(signal.counts);
+        // half away from zero; the cast saturates, and takes NaN to 0
+        let rounded = if value < 0.0 {
+            value - 0.5
+        } else {
+            value + 0.5
+        };
+        match signal.kind {
+            Kind::I16 => self.set_word(signal, rounded as i16 as u16),
+            Kind::U32 => self.set_double(signal, rounded as u32),
+            _ => self.set_word(signal, rounded as u16),
+        }
+    }
+}
+
+impl Commands {
+    /// The block at power-up: everything off, the set-points the machine's own.
+    pub fn of(machine: &Machine) -> Self {
+        let mut block = Self::default();
+        let o = &machine.operation;
+        let per_minute = 60.0;
+        block.set(&V_SET, o.run_speed_m_s * per_minute);
+        block.set(&V_THREAD_SET, o.thread_speed_m_s * per_minute);
+        block.set(&TENSION_SET, o.tension_n_m);
+        block.set(&STALL_SET, o.tension_n_m * o.stall_share);
+        block.set(&ACCEL_SET, o.acceleration_m_s2);
+        block.set(&JERK_SET, o.jerk_m_s3);
+        block.set(&D_PRESET_UW, 2.0e3 * machine.parent_roll.full_radius_m);
+        block.set(&TORQUE_LIMIT_UW, 150.0);
+        block.set(&TORQUE_LIMIT_DRUMS, 150.0);
+        block
+    }
+}
+
+/// Both blocks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Written by the PLC.
+    pub commands: Commands,
+    /// Written by the simulator.
+    pub feedback: Feedback,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_have_neither_holes_nor_overlaps() {
+        for direction in [Direction::Command, Direction::Feedback] {
+            let mut next = 0;
+            for s in SIGNALS.iter().filter(|s| s.direction == direction) {
+                assert_eq!(s.word, next, "{}", s.name);
+                next += s.kind.words();
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_unique() {
+        for (i, s) in SIGNALS.iter().enumerate() {
+            assert!(SIGNALS[..i].iter().all(|t| t.name != s.name), "{}", s.name);
+        }
+    }
+
+    #[test]
+    fn values_round_to_the_nearest_count_and_saturate() {
+        let mut f = Feedback::default();
+        for (value, word) in [
+            (12.34, 123),
+            (-12.36, -124i16 as u16),
+            (1e9, 32767),
+            (-1e9, -32767i16 as u16),
+        ] {
+            f.set(&V_WEB, value);
+            assert_eq!(f.word(&V_WEB), word, "{value}");
+        }
+        f.set(&LENGTH_WU, 18_758.93);
+        assert_eq!(f.double(&LENGTH_WU), 1_875_893);
+        f.set(&V_WEB, f32::NAN);
+        assert_eq!(f.word(&V_WEB), 0);
+    }
+}
