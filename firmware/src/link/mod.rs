@@ -9,6 +9,7 @@ use embassy_sync::blocking_mutex::Mutex;
 use model_core::image::Image;
 
 pub mod modbus;
+pub mod seats;
 
 /// The process image as tasks share it. Whatever is done under one lock is one event to everybody else.
 ///
