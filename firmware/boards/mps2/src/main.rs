@@ -51,6 +51,7 @@ fn main() -> ! {
     let Some(mut core) = cortex_m::Peripherals::take() else {
         unreachable!("the entry point runs once")
     };
+    failure::guard_stack(&mut core.MPU);
     uart_log::start();
     interrupts::set_priorities(&mut core.NVIC);
     time_driver::start();
