@@ -1,4 +1,4 @@
-//! Keeps the plugin in memory: QEMU unloads plugins while threads of its own may still run in them.
+//! Keeps the plugin's code in memory after QEMU has unloaded it: a virtual core may still sleep in it.
 
 fn main() {
     println!("cargo::rustc-link-arg-cdylib=-Wl,-z,nodelete");

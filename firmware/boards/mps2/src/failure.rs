@@ -1,7 +1,7 @@
 //! The end: what the firmware does when it cannot go on.
 //!
-//! Does not try to go on. It says why in the log and stops QEMU with exit code 1; on a QEMU
-//! without `-semihosting` it stands still.
+//! Does not try to go on. It says why in the log and stops QEMU with exit code 1. On a QEMU
+//! without `-semihosting` it stands still after a panic, and a fault ends QEMU as a lockup.
 
 // Fault handlers are unsafe to define.
 #![allow(unsafe_code)]

@@ -5,12 +5,13 @@
 //!
 //! `-icount shift=1,sleep=off` makes virtual time a count of instructions and skips idle time: the
 //! guest's timers are exact whatever the host does, but seconds pass in a fraction of one. The
-//! guest calls an empty function, [`MARK`], once every virtual millisecond; there the plugin
+//! guest calls an empty function, `pace_mark_1ms`, once every virtual millisecond; there the plugin
 //! sleeps until that millisecond is over on the host's clock too. QEMU runs guest code without its
 //! big lock, so meanwhile it serves network and monitor.
 //!
 //! Arguments: `speed=4` runs four times real time, 1 is the default.
-//! A host that stalls is caught up with if it stalls for less than [`FORGIVEN`]; a longer stall
+//!
+//! A host that stalls is caught up with if it stalls for less than 250 ms; a longer stall
 //! (a laptop put to sleep) is not replayed, real time goes on from there.
 //!
 //! The interface is QEMU's plugin API, version 1 (`qemu-plugin.h`), declared as far as it is used.
