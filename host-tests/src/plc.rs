@@ -24,7 +24,7 @@ use crate::link::Link;
 /// Plant step, s: what one count of `plant_ticks` is.
 const PLANT_PERIOD_S: f64 = 0.004;
 /// Time of a program cycle, s of simulated time; usual for a winder PLC.
-const CYCLE_S: f64 = 0.040;
+pub const CYCLE_S: f64 = 0.040;
 /// A step stands at least this long, s: its commands have arrived and their effect is in the feedback.
 const SETTLE_S: f64 = 0.2;
 /// A refusal that stands longer than this belongs to the present step, s.
@@ -137,8 +137,6 @@ pub enum Step {
     LeadWeb,
     /// Slack is taken up at thread speed.
     Thread,
-    /// The run begins.
-    Start,
     /// The roll grows.
     Run,
     /// The machine stops.
@@ -162,7 +160,6 @@ impl Step {
             Step::SwitchOn => "switch drives on",
             Step::LeadWeb => "lead web through",
             Step::Thread => "thread",
-            Step::Start => "start run",
             Step::Run => "run",
             Step::Stop => "stop",
             Step::Rest => "stall tension",
@@ -179,8 +176,7 @@ impl Step {
             Step::MakeReady => Step::SwitchOn,
             Step::SwitchOn => Step::LeadWeb,
             Step::LeadWeb => Step::Thread,
-            Step::Thread => Step::Start,
-            Step::Start => Step::Run,
+            Step::Thread => Step::Run,
             Step::Run => Step::Stop,
             Step::Stop => Step::Rest,
             Step::Rest => Step::SwitchOff,
@@ -196,8 +192,6 @@ impl Step {
             Step::Preset => command::PRESET_ACCEPT,
             Step::LeadWeb => command::WEB_THREADED,
             Step::Thread => command::THREAD,
-            // thread is taken back only when run has taken over
-            Step::Start => command::THREAD | command::RUN,
             Step::Run => command::RUN,
             _ => 0,
         }
@@ -329,6 +323,11 @@ impl Plc {
         }
     }
 
+    /// The present step.
+    pub fn step(&self) -> Step {
+        self.step
+    }
+
     /// What the last cycle commanded.
     pub fn commands(&self) -> &Commands {
         &self.commands
@@ -397,7 +396,6 @@ impl Plc {
             Step::SwitchOn => drives(zsw1::OPERATION_ENABLED) && is(status::DRIVES_ON),
             Step::LeadWeb => is(status::WEB_THREADED),
             Step::Thread => is(status::TENSION_DETECTED),
-            Step::Start => sample.mode() == Some(Mode::Run),
             Step::Run => self.time_to_stop(sample),
             Step::Stop => {
                 is(status::ZERO_SPEED | status::TENSION_DETECTED)
@@ -448,7 +446,6 @@ impl Plc {
             Step::Acknowledge | Step::NewRolls | Step::Preset => 5.0,
             Step::MakeReady | Step::SwitchOn | Step::LeadWeb => 5.0,
             Step::Thread => 60.0,
-            Step::Start => 5.0,
             Step::Run => 60.0 + 1.5 * self.recipe.duration_s(),
             Step::Stop => 30.0 + 1.5 * self.recipe.ramp().stop(self.recipe.speed_m_s, 0.0).time_s,
             Step::Rest => 2.0 * REST_S,
@@ -470,7 +467,7 @@ pub fn wind(
     let mut plc = Plc::new(recipe.clone());
     let period = Duration::from_secs_f64(CYCLE_S / pace);
     let (mut last_tick, mut ticked) = (None, Instant::now());
-    while plc.step != Step::Done {
+    while plc.step() != Step::Done {
         interrupt::check()?;
         let began = Instant::now();
         let feedback = link.read()?;
