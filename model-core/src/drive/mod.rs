@@ -19,7 +19,7 @@ use diameter::DiameterEstimator;
 use drums::{DrumTask, Drums};
 use motor::Motor;
 use pi::Gains;
-use reference::{LinearRamp, SpeedRamp};
+use reference::SCurve;
 use unwind::{Unwind, UnwindTask};
 
 /// Period of the regulators' task, ms.
@@ -29,14 +29,18 @@ pub const DRIVE_PERIOD_MS: u32 = 10;
 const SAMPLE_LAG_S: f64 = 1.5e-3 * DRIVE_PERIOD_MS as f64;
 /// The symmetrical optimum's spread of the corner frequencies; 3 gives a phase margin of 53°.
 const SPREAD: f64 = 3.0;
-/// The tension reference goes from zero to full in this time, s.
-const TENSION_RAMP_S: f64 = 3.0;
+/// At its largest rate the tension reference goes from zero to full in this time, s …
+const TENSION_RAMP_S: f64 = 6.0;
+/// … and reaches that rate in this one, s.
+const TENSION_ROUNDING_S: f64 = 2.0;
 
 /// All regulators.
 #[derive(Clone, Copy, Debug)]
 pub struct Drive<R> {
-    ramp: SpeedRamp<R>,
-    tension: LinearRamp<R>,
+    speed: SCurve<R>,
+    tension: SCurve<R>,
+    /// Largest rate of the tension reference, N/s, and its change, N/s².
+    tension_rate: (R, R),
     diameter: DiameterEstimator<R>,
     unwind: Unwind<R>,
     drums: Drums<R>,
@@ -54,8 +58,12 @@ impl<R: Real> Drive<R> {
         let full = machine.operation.tension_n_m * machine.web.width_m;
         let motors = &machine.motors;
         Self {
-            ramp: SpeedRamp::new(period),
-            tension: LinearRamp::new(full / TENSION_RAMP_S, period),
+            speed: SCurve::new(period),
+            tension: SCurve::new(period),
+            tension_rate: (
+                R::of(full / TENSION_RAMP_S),
+                R::of(full / TENSION_RAMP_S / TENSION_ROUNDING_S),
+            ),
             diameter: DiameterEstimator::new(machine, period),
             unwind: Unwind::new(machine, period),
             drums: Drums::new(machine, period),
@@ -94,11 +102,12 @@ impl<R: Real> Drive<R> {
     }
 
     fn follow_references(&mut self, command: &DriveCommand<R>, v: R) {
-        self.tension.step(command.tension);
+        let (rate, jerk) = self.tension_rate;
+        self.tension.step(command.tension, rate, jerk);
         if !command.drums {
-            self.ramp.set(v);
+            self.speed.set(v);
         } else if !command.freeze_ramp {
-            self.ramp
+            self.speed
                 .step(command.v_target, command.acceleration, command.jerk);
         }
     }
@@ -113,13 +122,14 @@ impl<R: Real> Drive<R> {
     }
 
     fn torques(&mut self, command: &DriveCommand<R>, m: &Measurements<R>, v: R) -> BySection<R> {
-        let (v_ref, a_ref) = (self.ramp.v(), self.ramp.a());
+        let (v_ref, a_ref) = (self.speed.value(), self.speed.rate());
         let uw = self.unwind.step(
             &UnwindTask {
                 control: command.unwind,
                 v_ref,
                 a_ref,
                 tension_ref: self.tension.value(),
+                tension_rate: self.tension.rate(),
                 v,
                 r: self.diameter.radius(),
                 limit: command.torque_limit.uw,
@@ -149,8 +159,8 @@ impl<R: Real> Drive<R> {
         let r_uw = self.diameter.radius();
         DriveStatus {
             v,
-            v_ref: self.ramp.v(),
-            a_ref: self.ramp.a(),
+            v_ref: self.speed.value(),
+            a_ref: self.speed.rate(),
             v_uw: m.omega.uw * r_uw,
             r_uw,
             tension_ref: self.tension.value(),

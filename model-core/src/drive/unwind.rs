@@ -19,8 +19,10 @@ const TRIM_LIMIT: f64 = 0.20;
 const CRAWL_DAMPING: f64 = 0.5;
 /// Corner of the high-pass that keeps a wrong diameter out of the damping, rad/s.
 const WASHOUT: f64 = 1.0;
-/// Draw of the slack take-up: share of the web speed, and at least this speed, m/s.
-const DRAW: (f64, f64) = (0.02, 0.5 / 60.0);
+/// The slack take-up turns slower than the web by at least this, m/s …
+const LEAST_DRAW: f64 = 0.5 / 60.0;
+/// … and by a share of the web speed that grows with time, 1/s: a wrong diameter preset is found out, gently.
+const DRAW_RATE: f64 = 0.005;
 
 /// Below this speed the compensation of the closed brake fades, m/s: at standstill the brake takes what it must.
 const BRAKE_SPEED: f64 = 0.1;
@@ -31,6 +33,8 @@ pub struct Unwind<R> {
     c: Coefficients<R>,
     tension: Pi<R>,
     speed: Pi<R>,
+    /// Draw of the slack take-up, share of the web speed.
+    draw: R,
     /// Low-pass of the speed error; what it leaves is damped.
     slow_error: R,
     control: UnwindControl,
@@ -60,7 +64,7 @@ struct Coefficients<R> {
     damping: R,
     per_max_speed: R,
     washout: R,
-    draw: R,
+    draw_rate: R,
     least_draw: R,
     brake: R,
     per_brake_speed: R,
@@ -76,6 +80,8 @@ pub struct UnwindTask<R> {
     pub a_ref: R,
     /// Tension reference, N.
     pub tension_ref: R,
+    /// Its rate, N/s.
+    pub tension_rate: R,
     /// Web speed as measured, m/s.
     pub v: R,
     /// Estimated radius, m.
@@ -116,13 +122,14 @@ impl<R: Real> Unwind<R> {
                 damping: r(2.0 * CRAWL_DAMPING),
                 per_max_speed: r(1.0 / machine.operation.max_speed_m_s),
                 washout: r(WASHOUT * period),
-                draw: r(DRAW.0),
-                least_draw: r(DRAW.1),
+                draw_rate: r(DRAW_RATE * period),
+                least_draw: r(LEAST_DRAW),
                 brake: r(machine.brakes.uw_n_m),
                 per_brake_speed: r(1.0 / BRAKE_SPEED),
             },
             tension: Pi::default(),
             speed: Pi::default(),
+            draw: R::ZERO,
             slow_error: R::ZERO,
             control: UnwindControl::Off,
             torque: R::ZERO,
@@ -144,7 +151,8 @@ impl<R: Real> Unwind<R> {
         let roll = Roll {
             mass,
             mode: (c.web_stiffness / mass).sqrt(),
-            error: m.omega.uw * task.r - task.v,
+            // to raise the tension the unwind must run a little slower than the web
+            error: m.omega.uw * task.r - task.v + task.tension_rate / c.web_stiffness,
             limit,
         };
         self.slow_error += c.washout * (roll.error - self.slow_error);
@@ -202,7 +210,12 @@ impl<R: Real> Unwind<R> {
         entered: bool,
     ) -> R {
         let c = &self.c;
-        let draw = (c.draw * task.v_ref.abs()).max(c.least_draw);
+        self.draw = if entered {
+            R::ZERO
+        } else {
+            self.draw + c.draw_rate
+        };
+        let draw = (self.draw * task.v_ref.abs()).max(c.least_draw);
         let feed_forward = self.feed_forward(task, m, roll);
         let low = (feed_forward - task.tension_ref).max(-roll.limit);
         self.regulate_speed(
@@ -276,7 +289,7 @@ struct Roll<R> {
     mass: R,
     /// First web mode with the drums held, rad/s.
     mode: R,
-    /// Surface speed less web speed, m/s.
+    /// Surface speed less the speed that belongs to the tension reference, m/s.
     error: R,
     /// Largest force, N.
     limit: R,

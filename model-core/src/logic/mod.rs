@@ -292,24 +292,28 @@ impl<R: Real> Logic<R> {
     }
 
     fn obey_requests(&mut self, sight: &Sight<R>) {
-        let handled = [
+        let acts = [
             (command::PRESET_ACCEPT, Self::take_preset as Request<R>),
             (command::NEW_CORE, Self::take_new_core),
             (command::NEW_PARENT_ROLL, Self::take_new_parent_roll),
             (command::WEB_THREADED, Self::take_threaded_web),
         ];
-        for (bit, request) in handled {
-            if self.rising(sight, bit) {
-                self.refusal = request(self, sight).err().unwrap_or_default();
-            }
-        }
         let modes = [
             (command::STALL, Self::start_stall as Request<R>),
             (command::THREAD, Self::start_thread),
             (command::RUN, Self::start_run),
         ];
-        if let Some((_, request)) = modes.into_iter().find(|(bit, _)| self.rising(sight, *bit)) {
-            self.refusal = request(self, sight).err().unwrap_or_default();
+        let risen = |(bit, _): &(u16, Request<R>)| self.rising(sight, *bit);
+        let acts = acts.map(|act| risen(&act).then_some(act.1));
+        let mode = modes.into_iter().find(risen).map(|(_, request)| request);
+        let mut requests = acts.into_iter().chain([mode]).flatten().peekable();
+        if requests.peek().is_some() {
+            self.refusal = Refusal::None;
+        }
+        for request in requests {
+            if let Err(refusal) = request(self, sight) {
+                self.refusal = refusal;
+            }
         }
         self.end_requests(sight);
     }
@@ -329,7 +333,8 @@ impl<R: Real> Logic<R> {
         self.without_tension(sight)?;
         let diameter: R = sight.commands.get(&image::D_PRESET_UW);
         let r = diameter * R::of(0.5e-3);
-        if r < self.c.spool || r > self.c.full {
+        let count = R::of(0.5e-4);
+        if r < self.c.spool - count || r > self.c.full + count {
             return Err(Refusal::PresetOutOfRange);
         }
         self.one_shot.preset = Some(r);
