@@ -26,11 +26,13 @@ const PLANT_PERIOD_S: f64 = 0.004;
 /// Time of a program cycle, s of simulated time; usual for a winder PLC.
 pub const CYCLE_S: f64 = 0.040;
 /// A step stands at least this long, s: its commands have arrived and their effect is in the feedback.
-const SETTLE_S: f64 = 0.2;
+const STEP_S: f64 = 0.2;
 /// A refusal that stands longer than this belongs to the present step, s.
 const REFUSAL_S: f64 = 0.5;
-/// Time in stall tension at the end of the set, s: for the eye, in the picture.
-const REST_S: f64 = 3.0;
+/// The tension has settled when it has stayed for this long, s, ...
+const SETTLED_S: f64 = 2.0;
+/// ... this near to stall tension, of it.
+const SETTLED_BAND: f64 = 0.05;
 /// Without a tick for this long the simulator hangs.
 const STANDSTILL_OF_TICKS: Duration = Duration::from_secs(5);
 
@@ -137,6 +139,8 @@ pub enum Step {
     LeadWeb,
     /// Slack is taken up at thread speed.
     Thread,
+    /// Stall tension builds up.
+    Tension,
     /// The roll grows.
     Run,
     /// The machine stops.
@@ -160,6 +164,7 @@ impl Step {
             Step::SwitchOn => "switch drives on",
             Step::LeadWeb => "lead web through",
             Step::Thread => "thread",
+            Step::Tension => "build up tension",
             Step::Run => "run",
             Step::Stop => "stop",
             Step::Rest => "stall tension",
@@ -176,7 +181,8 @@ impl Step {
             Step::MakeReady => Step::SwitchOn,
             Step::SwitchOn => Step::LeadWeb,
             Step::LeadWeb => Step::Thread,
-            Step::Thread => Step::Run,
+            Step::Thread => Step::Tension,
+            Step::Tension => Step::Run,
             Step::Run => Step::Stop,
             Step::Stop => Step::Rest,
             Step::Rest => Step::SwitchOff,
@@ -191,7 +197,7 @@ impl Step {
             Step::NewRolls => command::NEW_CORE | command::NEW_PARENT_ROLL,
             Step::Preset => command::PRESET_ACCEPT,
             Step::LeadWeb => command::WEB_THREADED,
-            Step::Thread => command::THREAD,
+            Step::Thread | Step::Tension => command::THREAD,
             Step::Run => command::RUN,
             _ => 0,
         }
@@ -308,6 +314,7 @@ pub struct Plc {
     commands: Commands,
     step: Step,
     since_s: f64,
+    settled_since_s: Option<f64>,
     first_tick: Option<u32>,
 }
 
@@ -319,6 +326,7 @@ impl Plc {
             recipe,
             step: Step::Acknowledge,
             since_s: 0.0,
+            settled_since_s: None,
             first_tick: None,
         }
     }
@@ -342,8 +350,11 @@ impl Plc {
             step: self.step,
             feedback: *feedback,
         };
+        let tension = sample.value(&image::TENSION) / self.commands.get::<f64>(&image::STALL_SET);
+        self.settled_since_s = ((tension - 1.0).abs() <= SETTLED_BAND)
+            .then(|| self.settled_since_s.unwrap_or(sample.t_s));
         let in_step_s = sample.t_s - self.since_s;
-        if in_step_s >= SETTLE_S && self.finished(&sample, in_step_s) {
+        if in_step_s >= STEP_S && self.finished(&sample) {
             self.step = self.step.next();
             self.since_s = sample.t_s;
         } else if let Some(what) = self.complaint(&sample, in_step_s) {
@@ -369,7 +380,7 @@ impl Plc {
     }
 
     /// Has the present step reached its end?
-    fn finished(&self, sample: &Sample, in_step_s: f64) -> bool {
+    fn finished(&self, sample: &Sample) -> bool {
         let is = |bits| sample.feedback.word(&image::WINDER_STATUS) & bits == bits;
         let drives = |bits| {
             [
@@ -401,7 +412,9 @@ impl Plc {
                 is(status::ZERO_SPEED | status::TENSION_DETECTED)
                     && sample.mode() == Some(Mode::Stall)
             }
-            Step::Rest => in_step_s >= REST_S,
+            Step::Tension | Step::Rest => self
+                .settled_since_s
+                .is_some_and(|since_s| sample.t_s - since_s >= SETTLED_S),
             Step::SwitchOff => !is(status::DRIVES_ON) && sample.mode() == Some(Mode::Off),
             Step::Done => true,
         }
@@ -448,7 +461,7 @@ impl Plc {
             Step::Thread => 60.0,
             Step::Run => 60.0 + 1.5 * self.recipe.duration_s(),
             Step::Stop => 30.0 + 1.5 * self.recipe.ramp().stop(self.recipe.speed_m_s, 0.0).time_s,
-            Step::Rest => 2.0 * REST_S,
+            Step::Tension | Step::Rest => 30.0,
             Step::SwitchOff => 15.0,
             Step::Done => f64::INFINITY,
         }
@@ -466,15 +479,16 @@ pub fn wind(
     let mut link = Link::connect(address)?;
     let mut plc = Plc::new(recipe.clone());
     let period = Duration::from_secs_f64(CYCLE_S / pace);
-    let (mut last_tick, mut ticked) = (None, Instant::now());
+    // before the first tick there is nothing to see
+    let (mut last_tick, mut ticked) = (0, Instant::now());
     while plc.step() != Step::Done {
         interrupt::check()?;
         let began = Instant::now();
         let feedback = link.read()?;
         let sample = plc.cycle(&feedback)?;
         let tick = feedback.double(&image::PLANT_TICKS);
-        if last_tick != Some(tick) {
-            (last_tick, ticked) = (Some(tick), Instant::now());
+        if tick != last_tick {
+            (last_tick, ticked) = (tick, Instant::now());
             observer(&sample);
         } else if ticked.elapsed() > STANDSTILL_OF_TICKS {
             bail!(

@@ -35,6 +35,9 @@ const GREEN: &str = "#0d8a68";
 const GREY: &str = "#8a929c";
 const INK: &str = "#22272e";
 const FAINT: &str = "#e6e9ed";
+const BAND: &str = "fill='#8a929c' fill-opacity='0.22'";
+/// About the width of a letter.
+const LETTER: f64 = 6.4;
 
 /// A curve of a panel.
 struct Curve {
@@ -143,12 +146,7 @@ pub fn svg(title: &str, subtitle: &str, samples: &[Sample]) -> String {
         y += panel.height;
     }
     for t in time.ticks(10) {
-        out.text(
-            time.at(t),
-            y + 20.0,
-            "text-anchor='middle'",
-            &format!("{t}"),
-        );
+        out.text(time.at(t), y + 20.0, "text-anchor='middle'", &number(t));
     }
     out.text(WIDTH - RIGHT, y + 40.0, "text-anchor='end'", "time, s");
     out.0.push_str("</svg>\n");
@@ -222,6 +220,11 @@ impl Axis {
     }
 }
 
+/// A tick's value, with a proper minus sign.
+fn number(value: f64) -> String {
+    value.to_string().replace('-', "\u{2212}")
+}
+
 /// The round step nearest above: 1, 2 or 5 times a power of ten.
 fn round_step(rough: f64) -> f64 {
     let power = 10f64.powf(rough.max(f64::MIN_POSITIVE).log10().floor());
@@ -280,8 +283,7 @@ fn strip(out: &mut Svg, spans: &[Span], time: &Axis, y: f64) {
         out.add(format_args!(
             "<rect x='{x:.1}' y='{y:.1}' width='{width:.1}' height='{STRIP}' fill='{colour}'/>\n"
         ));
-        // about the width of a letter
-        if 6.5 * name.len() as f64 + 8.0 < width {
+        if width > LETTER * name.len() as f64 {
             out.text(
                 x + 0.5 * width,
                 y + 14.0,
@@ -298,12 +300,7 @@ fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: 
     for v in value.ticks(4) {
         let y = value.at(v);
         out.line((time.from, y), (time.to, y), FAINT);
-        out.text(
-            time.from - 8.0,
-            y + 4.5,
-            "text-anchor='end'",
-            &format!("{v}"),
-        );
+        out.text(time.from - 8.0, y + 4.5, "text-anchor='end'", &number(v));
     }
     for span in spans.iter().skip(1) {
         let x = time.at(span.from_s);
@@ -312,35 +309,14 @@ fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: 
     out.line((time.from, bottom), (time.to, bottom), GREY);
 
     out.text(LEFT, top - 10.0, "font-size='14'", panel.title);
-    let mut x = time.to;
-    for curve in panel.curves.iter().rev() {
-        x -= 6.8 * curve.name.len() as f64;
-        out.text(
-            x,
-            top - 10.0,
-            &format!("fill='{}'", curve.colour),
-            curve.name,
-        );
-        x -= 28.0;
-        path(out, curve, &format!("M{x:.1} {y:.1}h22", y = top - 14.5));
-        x -= 18.0;
-    }
+    legend(out, panel, time.to, top - 10.0);
 
     if let Some((signal, share)) = panel.band {
         let edge = |share: f64| trace(samples, time, &value, |s| s.value(signal) * (1.0 + share));
         let (above, below) = (edge(share), edge(-share));
         if !above.is_empty() {
             let points = above.iter().chain(below.iter().rev());
-            out.add(format_args!(
-                "<path d='{}Z' fill='{GREY}' fill-opacity='0.22'/>\n",
-                polyline(points)
-            ));
-            out.text(
-                time.to - 6.0,
-                top + 16.0,
-                &format!("text-anchor='end' fill='{GREY}' font-size='12'"),
-                &format!("shaded: reference ±{:.0} %", 100.0 * share),
-            );
+            out.add(format_args!("<path d='{}Z' {BAND}/>\n", polyline(points)));
         }
     }
     for curve in panel.curves {
@@ -349,6 +325,29 @@ fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: 
             curve,
             &polyline(trace(samples, time, &value, |s| s.value(curve.signal)).iter()),
         );
+    }
+}
+
+/// The names of the curves, right-aligned.
+fn legend(out: &mut Svg, panel: &Panel, right: f64, y: f64) {
+    const SAMPLE: f64 = 22.0;
+    let mut x = right;
+    let mut name = |out: &mut Svg, colour: &str, name: &str| {
+        out.text(x, y, &format!("text-anchor='end' fill='{colour}'"), name);
+        let sample = x - LETTER * name.chars().count() as f64 - 8.0 - SAMPLE;
+        x = sample - 20.0;
+        sample
+    };
+    for curve in panel.curves.iter().rev() {
+        let x = name(out, curve.colour, curve.name);
+        path(out, curve, &format!("M{x:.1} {:.1}h{SAMPLE}", y - 4.5));
+    }
+    if let Some((_, share)) = panel.band {
+        let x = name(out, GREY, &format!("±{:.0} %", 100.0 * share));
+        out.add(format_args!(
+            "<rect x='{x:.1}' y='{:.1}' width='{SAMPLE}' height='10' {BAND}/>\n",
+            y - 9.5
+        ));
     }
 }
 

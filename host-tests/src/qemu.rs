@@ -8,6 +8,7 @@ use std::fmt;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::ops::RangeInclusive;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
@@ -26,6 +27,9 @@ use crate::setup::{Mps2, on_path};
 const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// Log lines that are kept.
 const KEPT_LINES: usize = 10_000;
+
+/// Simulated time over real time: from slow motion to faster than any PC.
+const PACES: RangeInclusive<f64> = 0.01..=1000.0;
 
 /// How serious a log line is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -87,6 +91,20 @@ impl Default for Options {
     }
 }
 
+impl Options {
+    /// Refuses a pace that no clock can keep.
+    pub fn check(&self) -> Result<()> {
+        ensure!(
+            PACES.contains(&self.pace),
+            "pace {} is outside {} to {}: 1 is real time, 10 ten times faster",
+            self.pace,
+            PACES.start(),
+            PACES.end()
+        );
+        Ok(())
+    }
+}
+
 /// The lines of the log so far.
 #[derive(Clone, Debug, Default)]
 struct Log(Arc<Mutex<VecDeque<Line>>>);
@@ -119,11 +137,6 @@ pub struct Qemu {
 impl Qemu {
     /// Starts the simulator and waits until it answers.
     pub fn start(files: &Mps2, options: Options) -> Result<Self> {
-        ensure!(
-            options.pace.is_finite() && options.pace > 0.0,
-            "pace {} is not a positive number: 1 is real time, 10 ten times faster",
-            options.pace
-        );
         let port = free_port(options.port)?;
         let elf = fs::read(&files.firmware)
             .with_context(|| format!("cannot read the firmware {}", files.firmware.display()))?;

@@ -4,7 +4,8 @@
 
 use std::net::SocketAddr;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result};
+use model_core::machine::Machine;
 
 use crate::qemu::{self, Qemu};
 use crate::setup;
@@ -29,18 +30,20 @@ impl Board {
 }
 
 /// A running simulator; it ends when dropped.
-#[derive(Debug)]
 pub enum Simulator {
     /// In QEMU.
     Mps2(Qemu),
+    /// In this process.
+    Host(board_host::Board),
 }
 
 impl Simulator {
     /// Installs and builds what is missing, starts the simulator, and waits until it answers.
     pub fn start(board: Board, options: qemu::Options) -> Result<Self> {
+        options.check()?;
         match board {
             Board::Mps2 => Ok(Self::Mps2(Qemu::start(&setup::mps2()?, options)?)),
-            Board::Host => bail!("the board host is not there yet"),
+            Board::Host => Ok(Self::Host(host(options)?)),
         }
     }
 
@@ -48,6 +51,7 @@ impl Simulator {
     pub fn address(&self) -> SocketAddr {
         match self {
             Self::Mps2(qemu) => qemu.address(),
+            Self::Host(board) => board.address,
         }
     }
 
@@ -55,6 +59,30 @@ impl Simulator {
     pub fn check(&mut self) -> Result<()> {
         match self {
             Self::Mps2(qemu) => qemu.check(),
+            Self::Host(_) => Ok(()),
         }
     }
+}
+
+/// Spans of the machine that the boards simulate, NEWS-8000.
+const SPANS: usize = 3;
+
+fn host(options: qemu::Options) -> Result<board_host::Board> {
+    let qemu::Options { port, pace, .. } = options;
+    let mut simulator = model_core::simulator::Simulator::<f32, SPANS>::new(&Machine::news_8000())?;
+    let options = board_host::Options {
+        port,
+        ..board_host::Options::default()
+    };
+    // the board steps in real time: at another pace, more or fewer drive cycles to the step
+    let mut owed = 0.0;
+    let step = move |image: &mut _| {
+        owed += pace;
+        while owed >= 1.0 {
+            simulator.drive_cycle(image);
+            owed -= 1.0;
+        }
+    };
+    board_host::Board::start(options, step)
+        .with_context(|| format!("cannot start the simulator at port {port} of 127.0.0.1"))
 }
