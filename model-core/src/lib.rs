@@ -9,8 +9,12 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod drive;
+pub mod exchange;
 pub mod image;
 pub mod logic;
 pub mod machine;
+pub mod plant;
 pub mod profidrive;
 pub mod real;
+pub mod simulator;

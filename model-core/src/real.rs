@@ -38,6 +38,10 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// The bits folded to 32, for comparing trajectories.
     fn fingerprint(self) -> u32;
+    /// The whole number, exactly or nearest.
+    fn of_i32(n: i32) -> Self;
+    /// The largest whole number that is not larger, saturating.
+    fn floor_i32(self) -> i32;
 
     /// |x|
     fn abs(self) -> Self {
@@ -128,6 +132,13 @@ impl Real for f32 {
     fn sqrt(self) -> Self {
         libm::sqrtf(self)
     }
+    fn of_i32(n: i32) -> Self {
+        n as f32
+    }
+    fn floor_i32(self) -> i32 {
+        let toward_zero = self as i32;
+        toward_zero - i32::from(toward_zero as f32 > self)
+    }
     fn fingerprint(self) -> u32 {
         self.to_bits()
     }
@@ -146,6 +157,13 @@ impl Real for f64 {
     }
     fn sqrt(self) -> Self {
         libm::sqrt(self)
+    }
+    fn of_i32(n: i32) -> Self {
+        n as f64
+    }
+    fn floor_i32(self) -> i32 {
+        let toward_zero = self as i32;
+        toward_zero - i32::from(toward_zero as f64 > self)
     }
     fn fingerprint(self) -> u32 {
         let bits = self.to_bits();

@@ -1,0 +1,180 @@
+//! What the plant, the regulators and the logic hand to each other.
+//!
+//! Not here: the process image, which is what a PLC sees. Each of these has one writer. The regulators get
+//! [`Measurements`] and cannot name the plant: what a drive cannot measure, they do not know.
+
+use crate::real::Real;
+
+/// A value for each driven section.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BySection<T> {
+    /// Unwind.
+    pub uw: T,
+    /// Rear drum.
+    pub rd: T,
+    /// Front drum.
+    pub fd: T,
+    /// Rider roll.
+    pub rr: T,
+}
+
+impl<T> BySection<T> {
+    /// Applies `f` to every section.
+    pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> BySection<U> {
+        BySection {
+            uw: f(self.uw),
+            rd: f(self.rd),
+            fd: f(self.fd),
+            rr: f(self.rr),
+        }
+    }
+
+    /// Pairs every section with that of another.
+    pub fn zip<U>(self, other: BySection<U>) -> BySection<(T, U)> {
+        BySection {
+            uw: (self.uw, other.uw),
+            rd: (self.rd, other.rd),
+            fd: (self.fd, other.fd),
+            rr: (self.rr, other.rr),
+        }
+    }
+
+    /// All sections in order.
+    pub fn into_array(self) -> [T; 4] {
+        [self.uw, self.rd, self.fd, self.rr]
+    }
+}
+
+/// A value for each brake.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Brakes<T> {
+    /// Unwind.
+    pub uw: T,
+    /// Rear drum.
+    pub rd: T,
+    /// Front drum.
+    pub fd: T,
+}
+
+impl<T: Copy> Brakes<T> {
+    /// The same for all three.
+    pub fn all(value: T) -> Self {
+        Self {
+            uw: value,
+            rd: value,
+            fd: value,
+        }
+    }
+}
+
+/// What people do at the machine. Each act is idempotent, so it may stand for more than one step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Handling {
+    /// Lead the web through the machine, with some slack.
+    pub thread_web: bool,
+    /// Put in an empty core.
+    pub new_core: bool,
+    /// Put in a full parent roll.
+    pub new_parent_roll: bool,
+}
+
+/// What acts on the winder: from the drive task to the plant task.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Actuators<R> {
+    /// Shaft torques of the motors, N·m.
+    pub torque: BySection<R>,
+    /// Brakes commanded on.
+    pub brakes: Brakes<bool>,
+    /// What people do.
+    pub handling: Handling,
+}
+
+/// What can be measured on a winder: from the plant task to the drive task.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measurements<R> {
+    /// Angular velocities of the motors, referred to their rolls, rad/s.
+    pub omega: BySection<R>,
+    /// Web tension from the load cells, N, total across the width.
+    pub tension: R,
+    /// Shipping-roll diameter from the position of the rider-roll beam, m.
+    pub d_wu: R,
+    /// Pulses of the rear drum's encoder since power-up; wraps.
+    pub pulses_rd: u32,
+    /// Brakes that are closed.
+    pub brakes: Brakes<bool>,
+}
+
+/// How the unwind is controlled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UnwindControl {
+    /// No torque.
+    #[default]
+    Off,
+    /// Holds the web's speed less a small draw, with no more torque than the tension reference: takes up slack.
+    TakeUp,
+    /// Tension.
+    Tension,
+    /// Speed, to stop the roll after a web break.
+    Speed,
+}
+
+/// What the logic asks of the regulators for one drive cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DriveCommand<R> {
+    /// How the unwind is controlled.
+    pub unwind: UnwindControl,
+    /// Drums and rider roll hold the web speed; otherwise no torque.
+    pub drums: bool,
+    /// Web speed to go to, m/s.
+    pub v_target: R,
+    /// Limit of the acceleration on the way, m/s².
+    pub acceleration: R,
+    /// Limit of its rate, m/s³.
+    pub jerk: R,
+    /// The ramp stands still.
+    pub freeze_ramp: bool,
+    /// Tension to go to, N.
+    pub tension: R,
+    /// Radius of the parent roll to take over, m.
+    pub preset: Option<R>,
+    /// The web is gone: hold the diameter estimate.
+    pub freeze_diameter: bool,
+    /// The unwind's brake helps when its motor comes to its limit.
+    pub brake_assist: bool,
+    /// Limits of the motors' torques, of rated torque.
+    pub torque_limit: BySection<R>,
+    /// Added to the front drum's share of the drum torque.
+    pub front_share_trim: R,
+    /// Brakes on.
+    pub brakes: Brakes<bool>,
+    /// What people do, handed on to the plant.
+    pub handling: Handling,
+}
+
+/// What the regulators tell the logic after a drive cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DriveStatus<R> {
+    /// Web speed from the rear drum, m/s.
+    pub v: R,
+    /// Speed reference after the ramp, m/s.
+    pub v_ref: R,
+    /// Its acceleration, m/s².
+    pub a_ref: R,
+    /// Surface speed of the parent roll as the drive knows it, m/s.
+    pub v_uw: R,
+    /// Estimated radius of the parent roll, m.
+    pub r_uw: R,
+    /// Tension reference after its ramp, N.
+    pub tension_ref: R,
+    /// Torques that act on the shafts, N·m.
+    pub torque: BySection<R>,
+    /// Torques of the motors, of rated torque.
+    pub load: BySection<R>,
+    /// Shaft powers, W.
+    pub power: BySection<R>,
+}
+
+/// A difference of at most `tolerance`.
+pub fn near<R: Real>(a: R, b: R, tolerance: R) -> bool {
+    (a - b).abs() <= tolerance
+}

@@ -1,0 +1,160 @@
+//! The simulator: plant, regulators and logic, and the order in which they run.
+//!
+//! Not here: what makes them run on time. On a microcontroller three tasks call the three parts; on a PC
+//! [`Simulator`] calls them in the same order, so that the same commands at the same ticks give the same bits.
+//!
+//! The order is fixed: at a common tick the plant moves first, then the regulators see it, then the logic runs
+//! on what the regulators told, and what it asks for counts from the next drive cycle on.
+
+use crate::drive::{DRIVE_PERIOD_MS, Drive};
+use crate::exchange::{Actuators, DriveCommand, DriveStatus, Measurements};
+use crate::image::{self, Commands, Feedback, Image};
+use crate::logic::Logic;
+use crate::machine::{Machine, MachineError};
+use crate::plant::{PLANT_PERIOD_MS, Winder};
+use crate::real::Real;
+
+/// The plant's part: every 4 ms.
+#[derive(Clone, Debug)]
+pub struct Plant<R: Real, const SPANS: usize> {
+    winder: Winder<R, SPANS>,
+    record: Record,
+}
+
+/// How far the plant has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// Steps since power-up; wraps.
+    pub ticks: u32,
+    /// Hash over every state variable after every step.
+    pub trajectory: u32,
+}
+
+impl Record {
+    /// FNV-1a's starting value. Source: Fowler, Noll, Vo, draft-eastlake-fnv, 32 bits.
+    const START: u32 = 0x811c_9dc5;
+    /// FNV-1a's prime.
+    const PRIME: u32 = 0x0100_0193;
+
+    fn step(&mut self, variables: impl Iterator<Item = u32>) {
+        self.ticks = self.ticks.wrapping_add(1);
+        for bits in variables {
+            self.trajectory = (self.trajectory ^ bits).wrapping_mul(Self::PRIME);
+        }
+    }
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self {
+            ticks: 0,
+            trajectory: Self::START,
+        }
+    }
+}
+
+impl<R: Real, const SPANS: usize> Plant<R, SPANS> {
+    /// The plant of a machine; fails with the first parameter outside its limits.
+    pub fn new(machine: &Machine) -> Result<Self, MachineError> {
+        Ok(Self {
+            winder: Winder::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS))?,
+            record: Record::default(),
+        })
+    }
+
+    /// 4 ms of the winder.
+    pub fn tick(&mut self, actuators: &Actuators<R>) -> (Measurements<R>, Record) {
+        let measurements = self.winder.step(actuators);
+        self.record
+            .step(self.winder.state().iter().map(R::fingerprint));
+        (measurements, self.record)
+    }
+
+    /// The winder itself: ground truth.
+    pub fn winder(&self) -> &Winder<R, SPANS> {
+        &self.winder
+    }
+
+    /// The winder itself, to put it into a state.
+    pub fn winder_mut(&mut self) -> &mut Winder<R, SPANS> {
+        &mut self.winder
+    }
+}
+
+/// All parts in one hand, in lockstep.
+#[derive(Clone, Debug)]
+pub struct Simulator<R: Real, const SPANS: usize> {
+    /// The plant's part.
+    pub plant: Plant<R, SPANS>,
+    /// The regulators.
+    pub drive: Drive<R>,
+    /// The logic.
+    pub logic: Logic<R>,
+    actuators: Actuators<R>,
+    measurements: Measurements<R>,
+    command: DriveCommand<R>,
+    status: DriveStatus<R>,
+    record: Record,
+    /// Time within the common period of both tasks, ms.
+    phase_ms: u32,
+}
+
+impl<R: Real, const SPANS: usize> Simulator<R, SPANS> {
+    /// The simulator of a machine at power-up; fails with the first parameter outside its limits.
+    pub fn new(machine: &Machine) -> Result<Self, MachineError> {
+        Ok(Self {
+            plant: Plant::new(machine)?,
+            drive: Drive::new(machine),
+            logic: Logic::new(machine),
+            actuators: Actuators::default(),
+            measurements: Measurements::default(),
+            command: DriveCommand::default(),
+            status: DriveStatus::default(),
+            record: Record::default(),
+            phase_ms: 0,
+        })
+    }
+
+    /// One drive cycle of 10 ms: the plant's ticks up to it, the regulators, the logic.
+    pub fn drive_cycle(&mut self, image: &mut Image) {
+        let end = self.phase_ms + DRIVE_PERIOD_MS;
+        let plant_ticks = end / PLANT_PERIOD_MS - self.phase_ms / PLANT_PERIOD_MS;
+        for _ in 0..plant_ticks {
+            (self.measurements, self.record) = self.plant.tick(&self.actuators);
+        }
+        self.phase_ms = end % (PLANT_PERIOD_MS * DRIVE_PERIOD_MS);
+        (self.actuators, self.status) = self.drive.step(&self.command, &self.measurements);
+        self.command = logic_tick(
+            &mut self.logic,
+            &image.commands,
+            &self.measurements,
+            &self.status,
+            &self.record,
+            &mut image.feedback,
+        );
+    }
+
+    /// How far the plant has come.
+    pub fn record(&self) -> Record {
+        self.record
+    }
+
+    /// What the regulators told last.
+    pub fn status(&self) -> &DriveStatus<R> {
+        &self.status
+    }
+}
+
+/// The logic's part: once every drive cycle, after the regulators.
+pub fn logic_tick<R: Real>(
+    logic: &mut Logic<R>,
+    commands: &Commands,
+    measurements: &Measurements<R>,
+    status: &DriveStatus<R>,
+    record: &Record,
+    feedback: &mut Feedback,
+) -> DriveCommand<R> {
+    feedback.set_double(&image::PLANT_TICKS, record.ticks);
+    feedback.set_double(&image::TRAJECTORY, record.trajectory);
+    logic.step(commands, measurements, status, feedback)
+}
