@@ -99,7 +99,7 @@ struct Outcome {
     took: Duration,
 }
 
-fn play_with_room(acts: impl IntoIterator<Item = Act>, room: usize) -> Outcome {
+fn play_with(timeouts: &Timeouts, acts: impl IntoIterator<Item = Act>, room: usize) -> Outcome {
     let cell = ImageCell::<NoopRawMutex>::new(RefCell::new(image()));
     let mut client = Client {
         acts: acts.into_iter().collect(),
@@ -108,7 +108,7 @@ fn play_with_room(acts: impl IntoIterator<Item = Act>, room: usize) -> Outcome {
     };
     let mut answered = 0;
     let start = Instant::now();
-    let end = block_on(session(&mut client, &cell, &SHORT, || answered += 1));
+    let end = block_on(session(&mut client, &cell, timeouts, || answered += 1));
     Outcome {
         end,
         replies: client.replies,
@@ -119,7 +119,7 @@ fn play_with_room(acts: impl IntoIterator<Item = Act>, room: usize) -> Outcome {
 }
 
 fn play(acts: impl IntoIterator<Item = Act>) -> Outcome {
-    play_with_room(acts, usize::MAX)
+    play_with(&SHORT, acts, usize::MAX)
 }
 
 fn frame(transaction: u16, unit: u8, pdu: &[u8]) -> Vec<u8> {
@@ -261,9 +261,30 @@ fn half_a_request_stalls_however_it_drips() {
 }
 
 #[test]
+fn each_request_has_its_own_time() {
+    let timeouts = Timeouts {
+        half_request: Duration::from_millis(400),
+        ..Timeouts::default()
+    };
+    let pause = || Act::Wait(Duration::from_millis(250));
+    let bytes = frames(&[READ.to_vec(), READ.to_vec()]);
+    let (half, rest) = bytes.split_at(5);
+    let (rest, other_half) = rest.split_at(bytes.len() / 2);
+    let pieces = [half, rest, other_half].map(|piece| Act::Send(piece.to_vec()));
+    let [half, rest, other_half] = pieces;
+    let o = play_with(
+        &timeouts,
+        [half, pause(), rest, pause(), other_half],
+        usize::MAX,
+    );
+    assert_eq!((o.end, o.answered), (End::Closed, 2));
+}
+
+#[test]
 fn who_does_not_read_is_dropped() {
     let one = frame(0, 0, &[3, 2, 0x10, 0]).len();
-    let o = play_with_room(
+    let o = play_with(
+        &SHORT,
         [Act::Send(frames(&vec![READ.to_vec(); 5])), Act::Hang],
         2 * one + 3,
     );

@@ -5,6 +5,9 @@
 //! A newcomer always gets a place. When all are taken, it gets that of a client which has never been answered,
 //! the longest connected first; if there is none, that of the client which was answered longest ago. So a storm
 //! of connections that ask nothing displaces only itself, and not the PLC.
+//!
+//! A board with `N` places runs `N` + 1 tasks, each of which accepts, takes a seat and holds it for a session: the
+//! last one is for the newcomer while who was displaced still leaves.
 
 use core::cell::RefCell;
 use core::future::poll_fn;

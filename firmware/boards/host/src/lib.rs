@@ -11,7 +11,6 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embedded_io_adapters::tokio_1::FromTokio;
 use firmware::journal::Journal;
@@ -21,7 +20,7 @@ use firmware::link::seats::Seats;
 use firmware::lockstep::Lockstep;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::machine::Machine;
-use tokio::net::{TcpListener, TcpStream};
+use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 
 /// Period of [`Board::start`]'s `step`: the drive cycle.
@@ -101,13 +100,19 @@ impl Board {
             TcpListener::from_std(listener)?
         };
         let server = Arc::new(Server {
+            listener,
             image: image.clone(),
             seats: Seats::new(),
             timeouts: options.timeouts,
         });
+        // One more than there are seats, for the client that displaces another.
+        for _ in 0..=CLIENTS {
+            runtime.spawn(server.clone().serve());
+        }
         let (stop_links, stopped) = oneshot::channel();
         let links = thread::Builder::new().name("links".into()).spawn(move || {
-            let _ = runtime.block_on(select(stopped, server.accept(listener)));
+            // What was spawned ends with the runtime.
+            let _ = runtime.block_on(stopped);
         })?;
         let (stop_steps, stopped) = mpsc::channel();
         let steps = thread::Builder::new().name("steps".into()).spawn({
@@ -169,32 +174,30 @@ fn pace(
 }
 
 struct Server {
+    listener: TcpListener,
     image: Arc<ImageCell>,
     seats: Seats<CriticalSectionRawMutex, CLIENTS>,
     timeouts: Timeouts,
 }
 
 impl Server {
-    async fn accept(self: Arc<Self>, listener: TcpListener) -> ! {
+    /// One client after the other. As on the other boards this is a task of its own for good, not for one client:
+    /// the queue of timers has a place for each task, and keeps that of one that is gone until it expires.
+    async fn serve(self: Arc<Self>) {
         loop {
-            match listener.accept().await {
-                Ok((stream, _)) => {
-                    tokio::spawn(self.clone().serve(stream));
-                }
-                Err(_) => tokio::time::sleep(ACCEPT_AGAIN).await,
+            let Ok((stream, _)) = self.listener.accept().await else {
+                tokio::time::sleep(ACCEPT_AGAIN).await;
+                continue;
+            };
+            let seat = self.seats.take();
+            // Without it a reply may wait for the client's delayed acknowledgement.
+            let _ = stream.set_nodelay(true);
+            let mut stream = FromTokio::new(stream);
+            let session = session(&mut stream, &self.image, &self.timeouts, || seat.answered());
+            if seat.hold(session).await == Some(End::NotReading) {
+                // Not to be kept by the system either, with replies that nobody will fetch.
+                let _ = stream.inner().set_zero_linger();
             }
-        }
-    }
-
-    async fn serve(self: Arc<Self>, stream: TcpStream) {
-        let seat = self.seats.take();
-        // Without it a reply may wait for the client's delayed acknowledgement.
-        let _ = stream.set_nodelay(true);
-        let mut stream = FromTokio::new(stream);
-        let session = session(&mut stream, &self.image, &self.timeouts, || seat.answered());
-        if seat.hold(session).await == Some(End::NotReading) {
-            // Not to be kept by the system either, with replies that nobody will fetch.
-            let _ = stream.inner().set_zero_linger();
         }
     }
 }
