@@ -354,15 +354,10 @@ fn line(frame: &Frame<'_>) -> Line {
     Line { level, text }
 }
 
-/// What QEMU itself has to say, and a panic by semihosting.
+/// What QEMU itself has to say, and what the firmware says by semihosting.
 fn listen(messages: ChildStderr, log: &Log, sink: &Sink) {
     for text in BufReader::new(messages).lines().map_while(Result::ok) {
-        log.push(
-            Line {
-                level: Level::Warn,
-                text,
-            },
-            sink,
-        );
+        let level = Level::Info;
+        log.push(Line { level, text }, sink);
     }
 }

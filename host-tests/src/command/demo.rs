@@ -38,7 +38,7 @@ pub struct Args {
     /// Web speed [default: 1200]
     #[arg(long, value_name = "M_MIN")]
     speed: Option<f64>,
-    /// Simulated time over real time
+    /// Simulated time over real time; much above 10 the PLC's heartbeat comes late on a busy PC
     #[arg(long, value_name = "N", default_value_t = 1.0)]
     pace: f64,
     /// Directory for the picture and the data
