@@ -6,6 +6,7 @@
 
 pub mod journal;
 pub mod link;
+pub mod lockstep;
 pub mod tasks;
 
 /// The numbers the firmware computes with.

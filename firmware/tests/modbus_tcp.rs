@@ -86,9 +86,9 @@ fn image() -> Image {
 }
 
 const SHORT: Timeouts = Timeouts {
-    idle: Duration::from_millis(120),
-    half_request: Duration::from_millis(40),
-    write: Duration::from_millis(40),
+    idle: Duration::from_millis(400),
+    half_request: Duration::from_millis(50),
+    write: Duration::from_millis(50),
 };
 
 struct Outcome {

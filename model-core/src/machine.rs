@@ -208,8 +208,11 @@ impl core::error::Error for MachineError {}
 
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
-/// Every preset by name.
-pub const PRESETS: &[(&str, fn() -> Machine)] = &[("NEWS-8000", Machine::news_8000)];
+/// A machine that ships, by name.
+pub type Preset = (&'static str, fn() -> Machine);
+
+/// Every preset.
+pub const PRESETS: &[Preset] = &[("NEWS-8000", Machine::news_8000)];
 
 impl Machine {
     /// The preset of a name.

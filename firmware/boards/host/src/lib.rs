@@ -1,6 +1,6 @@
 //! The board that is a Linux process: the firmware's links on loopback, and a thread for its timed task.
 //!
-//! Not here: the simulator, which is what [`Board::start`] is given to step; hard real time, since a thread of an
+//! Not here: priorities, since the simulator runs in lockstep, see [`simulator`]; hard real time, since a thread of an
 //! ordinary process is late now and then, though no step is ever lost; addresses other than loopback.
 
 use std::cell::RefCell;
@@ -14,9 +14,11 @@ use std::time::{Duration, Instant};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embedded_io_adapters::tokio_1::FromTokio;
+use firmware::journal::Journal;
 use firmware::link;
 use firmware::link::modbus::tcp::{End, Timeouts, session};
 use firmware::link::seats::Seats;
+use firmware::lockstep::Lockstep;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::machine::Machine;
 use tokio::net::{TcpListener, TcpStream};
@@ -43,6 +45,8 @@ pub struct Options {
     pub timeouts: Timeouts,
     /// The image at power-up.
     pub image: Image,
+    /// How many times real time the steps run; 1 is real time.
+    pub pace: f64,
 }
 
 impl Default for Options {
@@ -54,6 +58,7 @@ impl Default for Options {
                 commands: Commands::of(&Machine::news_8000()),
                 feedback: Feedback::default(),
             },
+            pace: 1.0,
         }
     }
 }
@@ -107,7 +112,7 @@ impl Board {
         let (stop_steps, stopped) = mpsc::channel();
         let steps = thread::Builder::new().name("steps".into()).spawn({
             let image = image.clone();
-            move || pace(&stopped, &image, step)
+            move || pace(&stopped, STEP.div_f64(options.pace), &image, step)
         })?;
         Ok(Self {
             address,
@@ -140,14 +145,26 @@ impl Drop for Board {
     }
 }
 
+/// The step that simulates the machine of [`Options::default`] at power-up, and keeps a journal.
+pub fn simulator(journal: impl Journal + Send + 'static) -> impl FnMut(&mut Image) + Send {
+    let mut lockstep = Lockstep::new(&Machine::news_8000(), &Options::default().image, journal)
+        .expect("a preset is valid");
+    move |image| lockstep.cycle(image)
+}
+
 /// Steps at whole multiples of the period after the start. A late step is made up for, in its turn, and so the
 /// count of steps never drifts from the clock.
-fn pace(stopped: &mpsc::Receiver<()>, image: &ImageCell, mut step: impl FnMut(&mut Image)) {
-    let mut due = Instant::now() + STEP;
+fn pace(
+    stopped: &mpsc::Receiver<()>,
+    period: Duration,
+    image: &ImageCell,
+    mut step: impl FnMut(&mut Image),
+) {
+    let mut due = Instant::now() + period;
     let wait = |due: Instant| stopped.recv_timeout(due.saturating_duration_since(Instant::now()));
     while wait(due) == Err(RecvTimeoutError::Timeout) {
         image.lock(|image| step(&mut image.borrow_mut()));
-        due += STEP;
+        due += period;
     }
 }
 

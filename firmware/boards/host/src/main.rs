@@ -3,9 +3,10 @@
 use std::env;
 use std::process::ExitCode;
 
-use board_host::{Board, Options};
+use board_host::{Board, Options, STEP, simulator};
 use embassy_futures::select::select;
-use model_core::image::{HEARTBEAT, Image};
+use firmware::journal::Journal;
+use model_core::logic::{Fault, Mode, Refusal};
 use tokio::signal::unix::{SignalKind, signal};
 
 /// Unlike Modbus's own 502, it needs no privilege.
@@ -43,7 +44,7 @@ fn run(port: u16) -> std::io::Result<()> {
         // Before the board says that it is ready, for whoever then stops it at once.
         let mut interrupt = signal(SignalKind::interrupt())?;
         let mut terminate = signal(SignalKind::terminate())?;
-        let board = Board::start(options, beat)?;
+        let board = Board::start(options, simulator(Log))?;
         println!("ready modbus={}", board.address);
         select(interrupt.recv(), terminate.recv()).await;
         board.stop();
@@ -51,8 +52,19 @@ fn run(port: u16) -> std::io::Result<()> {
     })
 }
 
-/// Stands in for the simulator.
-fn beat(image: &mut Image) {
-    let feedback = &mut image.feedback;
-    feedback.set_word(&HEARTBEAT, feedback.word(&HEARTBEAT).wrapping_add(1));
+/// The journal for people.
+struct Log;
+
+impl Journal for Log {
+    fn command(&mut self, _: u32, _: u16, _: u16) {}
+
+    fn state(&mut self, cycle: u32, mode: Mode, fault: Fault, refusal: Refusal) {
+        let seconds = f64::from(cycle) * STEP.as_secs_f64();
+        eprintln!(
+            "{seconds:.2} s: {}; fault: {}; refused: {}",
+            mode.name(),
+            fault.name(),
+            refusal.name()
+        );
+    }
 }

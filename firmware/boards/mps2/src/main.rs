@@ -16,7 +16,7 @@ mod lan9118;
 mod net;
 mod pace;
 mod register;
-mod standin;
+mod simulator;
 mod time_driver;
 mod uart_log;
 
@@ -66,11 +66,10 @@ fn main() -> ! {
     let plant = PLANT.start(Interrupt::Plant);
     let drive = DRIVE.start(Interrupt::Drive);
     let background = BACKGROUND.start(Interrupt::Background);
-    plant.spawn(standin::plant(start).expect("first"));
-    drive.spawn(standin::drive(start).expect("first"));
-    background.spawn(standin::report().expect("first"));
-    background.spawn(pace::pace().expect("first"));
-    background.spawn(net::network().expect("first"));
+    let exchange = simulator::exchange();
+    plant.spawn(simulator::plant(start, exchange).expect("first"));
+    drive.spawn(simulator::drive(start, exchange).expect("first"));
+    background.spawn(simulator::background(exchange).expect("first"));
 
     // Not an executor: embassy's idles in WFE, on which QEMU spins.
     loop {
