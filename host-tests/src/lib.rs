@@ -7,6 +7,7 @@
 pub mod command;
 pub mod interrupt;
 pub mod link;
+pub mod log;
 pub mod plc;
 pub mod plot;
 pub mod qemu;

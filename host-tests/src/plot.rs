@@ -35,7 +35,7 @@ const GREEN: &str = "#0d8a68";
 const GREY: &str = "#8a929c";
 const INK: &str = "#22272e";
 const FAINT: &str = "#e6e9ed";
-const BAND: &str = "fill='#8a929c' fill-opacity='0.22'";
+const BAND: &str = "#e3e5e8";
 /// About the width of a letter.
 const LETTER: f64 = 6.4;
 
@@ -58,9 +58,9 @@ const fn curve(name: &'static str, signal: &'static Signal, colour: &'static str
     }
 }
 
-const fn reference(signal: &'static Signal) -> Curve {
+const fn reference(name: &'static str, signal: &'static Signal) -> Curve {
     Curve {
-        name: "reference",
+        name,
         signal,
         colour: GREY,
         width: 1.4,
@@ -82,7 +82,7 @@ const PANELS: &[Panel] = &[
         title: "Web speed, m/min",
         height: 170.0,
         curves: &[
-            reference(&image::V_REF),
+            reference("reference", &image::V_REF),
             curve("measured", &image::V_WEB, BLUE),
         ],
         band: None,
@@ -91,7 +91,7 @@ const PANELS: &[Panel] = &[
         title: "Web tension, N/m",
         height: 210.0,
         curves: &[
-            reference(&image::TENSION_REF),
+            reference("reference ±10 %", &image::TENSION_REF),
             curve("measured", &image::TENSION, ORANGE),
         ],
         band: Some((&image::TENSION_REF, TENSION_BAND)),
@@ -316,7 +316,10 @@ fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: 
         let (above, below) = (edge(share), edge(-share));
         if !above.is_empty() {
             let points = above.iter().chain(below.iter().rev());
-            out.add(format_args!("<path d='{}Z' {BAND}/>\n", polyline(points)));
+            out.add(format_args!(
+                "<path d='{}Z' fill='{BAND}'/>\n",
+                polyline(points)
+            ));
         }
     }
     for curve in panel.curves {
@@ -328,27 +331,23 @@ fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: 
     }
 }
 
-/// The names of the curves, right-aligned.
+/// The names of the curves, right-aligned: one text, so that nothing has to know how wide a letter is.
 fn legend(out: &mut Svg, panel: &Panel, right: f64, y: f64) {
-    const SAMPLE: f64 = 22.0;
-    let mut x = right;
-    let mut name = |out: &mut Svg, colour: &str, name: &str| {
-        out.text(x, y, &format!("text-anchor='end' fill='{colour}'"), name);
-        let sample = x - LETTER * name.chars().count() as f64 - 8.0 - SAMPLE;
-        x = sample - 20.0;
-        sample
-    };
-    for curve in panel.curves.iter().rev() {
-        let x = name(out, curve.colour, curve.name);
-        path(out, curve, &format!("M{x:.1} {:.1}h{SAMPLE}", y - 4.5));
-    }
-    if let Some((_, share)) = panel.band {
-        let x = name(out, GREY, &format!("±{:.0} %", 100.0 * share));
-        out.add(format_args!(
-            "<rect x='{x:.1}' y='{:.1}' width='{SAMPLE}' height='10' {BAND}/>\n",
-            y - 9.5
-        ));
-    }
+    let entries: Vec<_> = panel
+        .curves
+        .iter()
+        .map(|curve| {
+            let sample = if curve.dashed { "- - -" } else { "——" };
+            format!(
+                "<tspan fill='{}'>{sample} {}</tspan>",
+                curve.colour, curve.name
+            )
+        })
+        .collect();
+    out.add(format_args!(
+        "<text x='{right:.1}' y='{y:.1}' text-anchor='end' xml:space='preserve'>{}</text>\n",
+        entries.join("      ")
+    ));
 }
 
 fn path(out: &mut Svg, curve: &Curve, d: &str) {

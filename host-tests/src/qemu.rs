@@ -3,127 +3,29 @@
 //! Not here: building the firmware (that is [`crate::setup`]'s), other boards, a debugger. The emulated clock
 //! counts instructions, so runs are reproducible; a plugin holds it to real time or a multiple of it.
 
-use std::collections::VecDeque;
-use std::fmt;
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
-use std::ops::RangeInclusive;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
+use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 use defmt_decoder::{DecodeError, Frame, Table};
 
 use crate::interrupt;
 use crate::link::Link;
+use crate::log::{Level, Line, Log};
 use crate::setup::{Mps2, on_path};
+use crate::simulator::Options;
 
 /// Time from power-up to the first answer: a second or so, more on a busy PC.
 const START_TIMEOUT: Duration = Duration::from_secs(60);
-/// Log lines that are kept.
-const KEPT_LINES: usize = 10_000;
-
-/// Simulated time over real time: from slow motion to faster than any PC.
-const PACES: RangeInclusive<f64> = 0.01..=1000.0;
-
-/// How serious a log line is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
-    /// Finest.
-    Trace,
-    /// For whoever looks for an error.
-    Debug,
-    /// For everyone.
-    Info,
-    /// Something is odd.
-    Warn,
-    /// Something has failed.
-    Error,
-}
-
-/// A line of the log.
-#[derive(Clone, Debug)]
-pub struct Line {
-    /// How serious it is.
-    pub level: Level,
-    /// Time stamp (where the firmware gives one) and text.
-    pub text: String,
-}
-
-impl fmt::Display for Line {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let level = format!("{:?}", self.level).to_lowercase();
-        write!(f, "{level:<5} {}", self.text)
-    }
-}
-
-/// Gets every line as it comes.
-pub type Sink = Box<dyn Fn(&Line) + Send + Sync>;
-
-/// How to run it.
-pub struct Options {
-    /// Port for Modbus TCP; 0 = any free one.
-    pub port: u16,
-    /// Simulated time over real time.
-    pub pace: f64,
-    /// Who is shown the log.
-    pub sink: Sink,
-}
-
-impl fmt::Debug for Options {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Options {{ port: {}, pace: {} }}", self.port, self.pace)
-    }
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            port: 0,
-            pace: 1.0,
-            sink: Box::new(|_| ()),
-        }
-    }
-}
-
-impl Options {
-    /// Refuses a pace that no clock can keep.
-    pub fn check(&self) -> Result<()> {
-        ensure!(
-            PACES.contains(&self.pace),
-            "pace {} is outside {} to {}: 1 is real time, 10 ten times faster",
-            self.pace,
-            PACES.start(),
-            PACES.end()
-        );
-        Ok(())
-    }
-}
-
-/// The lines of the log so far.
-#[derive(Clone, Debug, Default)]
-struct Log(Arc<Mutex<VecDeque<Line>>>);
-
-impl Log {
-    fn lines(&self) -> MutexGuard<'_, VecDeque<Line>> {
-        // a line is pushed whole or not at all
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn push(&self, line: Line, sink: &Sink) {
-        sink(&line);
-        let mut lines = self.lines();
-        if lines.len() == KEPT_LINES {
-            lines.pop_front();
-        }
-        lines.push_back(line);
-    }
-}
+/// Lines of the log that an error shows.
+const LAST_WORDS: usize = 5;
 
 /// A running QEMU; it ends when dropped.
 #[derive(Debug)]
@@ -145,23 +47,19 @@ impl Qemu {
             .context("the firmware has no log: its ELF file lacks the defmt section")?;
 
         let command = command(files, port, options.pace);
-        let log = Log::default();
         let (started, child) = mpsc::channel();
-        let sink = Arc::new(options.sink);
-        let keeper = {
-            let (log, sink) = (log.clone(), Arc::clone(&sink));
-            thread::spawn(move || keep(command, &started, &table, &log, &sink))
-        };
+        let log = options.log.clone();
+        let keeper = thread::spawn(move || keep(command, &started, &table, &log));
         let mut child = child.recv().context("QEMU's thread has ended")??;
         let mut readers = vec![keeper];
         if let Some(messages) = child.stderr.take() {
-            let log = log.clone();
-            readers.push(thread::spawn(move || listen(messages, &log, &sink)));
+            let log = options.log.clone();
+            readers.push(thread::spawn(move || listen(messages, &log)));
         }
         let mut qemu = Self {
             child,
             address: SocketAddr::from((Ipv4Addr::LOCALHOST, port)),
-            log,
+            log: options.log,
             readers,
         };
         qemu.wait_until_it_answers()?;
@@ -171,11 +69,6 @@ impl Qemu {
     /// Where it answers Modbus TCP.
     pub fn address(&self) -> SocketAddr {
         self.address
-    }
-
-    /// The log so far, debug lines and all.
-    pub fn log(&self) -> Vec<Line> {
-        self.log.lines().iter().cloned().collect()
     }
 
     /// An error that says why, once QEMU has ended by itself.
@@ -190,18 +83,8 @@ impl Qemu {
         self.readers
             .drain(..)
             .for_each(|reader| drop(reader.join()));
-        let lines = self.log.lines();
-        let last: Vec<_> = lines
-            .iter()
-            .rev()
-            .take(5)
-            .rev()
-            .map(|line| format!("\n  {line}"))
-            .collect();
-        bail!(
-            "QEMU has ended ({status}); its last words:{}",
-            last.concat()
-        )
+        let last_words = self.log.last(LAST_WORDS);
+        bail!("QEMU has ended ({status}); its last words:{last_words}")
     }
 
     fn wait_until_it_answers(&mut self) -> Result<()> {
@@ -288,13 +171,7 @@ fn escaped(path: &Path) -> String {
 ///
 /// One thread for both: QEMU ends with the thread that started it (see [`command`]), and this one lives as long
 /// as QEMU does.
-fn keep(
-    mut command: Command,
-    started: &mpsc::Sender<Result<Child>>,
-    table: &Table,
-    log: &Log,
-    sink: &Sink,
-) {
+fn keep(mut command: Command, started: &mpsc::Sender<Result<Child>>, table: &Table, log: &Log) {
     let mut child = match command.spawn().context("cannot start QEMU") {
         Ok(child) => child,
         Err(error) => {
@@ -318,17 +195,15 @@ fn keep(
         decoder.received(&buffer[..n]);
         loop {
             match decoder.decode() {
-                Ok(frame) => log.push(line(&frame), sink),
+                Ok(frame) => log.push(line(&frame)),
                 Err(DecodeError::UnexpectedEof) => break,
                 Err(DecodeError::Malformed) => {
                     let text = "log frame cannot be decoded".to_owned();
-                    log.push(
-                        Line {
-                            level: Level::Warn,
-                            text,
-                        },
-                        sink,
-                    );
+                    log.push(Line {
+                        level: Level::Warn,
+                        time: None,
+                        text,
+                    });
                     if !table.encoding().can_recover() {
                         return;
                     }
@@ -346,23 +221,20 @@ fn line(frame: &Frame<'_>) -> Line {
         Some("error") => Level::Error,
         _ => Level::Info,
     };
-    let message = frame.display_message();
-    let text = match frame.display_timestamp() {
-        Some(time) => format!("{time} {message}"),
-        None => message.to_string(),
-    };
-    Line { level, text }
+    Line {
+        level,
+        time: frame.display_timestamp().map(|time| time.to_string()),
+        text: frame.display_message().to_string(),
+    }
 }
 
-/// What QEMU itself has to say, and a panic by semihosting.
-fn listen(messages: ChildStderr, log: &Log, sink: &Sink) {
+/// What QEMU itself has to say, and what the firmware says by semihosting.
+fn listen(messages: ChildStderr, log: &Log) {
     for text in BufReader::new(messages).lines().map_while(Result::ok) {
-        log.push(
-            Line {
-                level: Level::Warn,
-                text,
-            },
-            sink,
-        );
+        log.push(Line {
+            level: Level::Info,
+            time: None,
+            text,
+        });
     }
 }

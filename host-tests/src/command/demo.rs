@@ -4,18 +4,19 @@ use std::fs;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use model_core::image::{self, Direction, Kind, SIGNALS};
 use model_core::machine::Machine;
 
+use crate::log::{Level, Log};
 use crate::plc::{self, Recipe, Sample};
 use crate::plot;
-use crate::qemu::{Level, Options};
 use crate::report::{Report, minutes};
-use crate::simulator::{Board, Simulator};
+use crate::simulator::{Board, Options, Simulator};
 
 /// Where there is no terminal for a progress bar, a line so often, s of simulated time.
 const LINE_EVERY_S: f64 = 10.0;
@@ -38,7 +39,7 @@ pub struct Args {
     /// Web speed [default: 1200]
     #[arg(long, value_name = "M_MIN")]
     speed: Option<f64>,
-    /// Simulated time over real time
+    /// Simulated time over real time; much above 10 the PLC's heartbeat comes late on a busy PC
     #[arg(long, value_name = "N", default_value_t = 1.0)]
     pace: f64,
     /// Directory for the picture and the data
@@ -92,7 +93,7 @@ pub fn main(args: &Args) -> Result<ExitCode> {
     let screen = bar.clone();
     let options = Options {
         pace: args.pace,
-        sink: Box::new(move |line| {
+        log: Log::new(move |line| {
             if line.level >= Level::Warn {
                 screen.suspend(|| eprintln!("{line}"));
             }
@@ -127,7 +128,8 @@ pub fn main(args: &Args) -> Result<ExitCode> {
     let took = minutes(began.elapsed().as_secs_f64());
     let files = write(&args.out, &title, &recipe, &samples)?;
     if let Err(error) = outcome {
-        // a simulator that has ended tells more than a broken connection
+        // a simulator that has ended tells more than a broken connection, after a moment to end in
+        thread::sleep(Duration::from_millis(200));
         simulator.check()?;
         return Err(error.context(format!(
             "the set was not wound; what was recorded is in {files}"

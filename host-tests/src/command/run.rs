@@ -8,8 +8,8 @@ use std::time::Duration;
 use anyhow::Result;
 
 use crate::interrupt::{self, Interrupted};
-use crate::qemu::{Level, Options};
-use crate::simulator::{Board, Simulator};
+use crate::log::{Level, Log};
+use crate::simulator::{Board, Options, Simulator};
 
 /// How to run the simulator.
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -37,7 +37,7 @@ fn serve(args: Args) -> Result<()> {
     let options = Options {
         port: args.port,
         pace: args.pace,
-        sink: Box::new(|line| {
+        log: Log::new(|line| {
             if line.level >= Level::Info {
                 eprintln!("{line}");
             }
