@@ -4,7 +4,10 @@
 //! is dropped.
 
 use std::fmt;
+use std::process::{Child, ExitStatus};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 
@@ -26,6 +29,24 @@ impl std::error::Error for Interrupted {}
 pub fn install() -> Result<()> {
     ctrlc::set_handler(|| REQUESTED.store(true, Ordering::Relaxed))
         .context("cannot take over Ctrl-C")
+}
+
+/// Waits for a process, and ends it once the user has asked to end.
+pub fn wait(child: &mut Child) -> Result<ExitStatus> {
+    loop {
+        if let Some(status) = child.try_wait().context("cannot wait for a process")? {
+            // Ctrl-C reaches both: how the process took it does not matter
+            check()?;
+            return Ok(status);
+        }
+        if let Err(interrupted) = check() {
+            // it may just have ended by itself
+            let _ = child.kill();
+            let _ = child.wait();
+            return Err(interrupted);
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
 }
 
 /// The error [`Interrupted`] once the user has asked to end.

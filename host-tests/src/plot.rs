@@ -306,7 +306,7 @@ fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: 
         let x = time.at(span.from_s);
         out.line((x, top), (x, bottom), FAINT);
     }
-    out.line((time.from, bottom), (time.to, bottom), GREY);
+    out.line((time.from, value.at(0.0)), (time.to, value.at(0.0)), GREY);
 
     out.text(LEFT, top - 10.0, "font-size='14'", panel.title);
     legend(out, panel, time.to, top - 10.0);

@@ -83,7 +83,7 @@ pub fn qemu() -> Result<PathBuf> {
         );
     };
     step("installing QEMU (apt-get)");
-    for arguments in [&["update"][..], &INSTALL] {
+    let apt_get = |arguments: &[&str]| {
         let line = [
             prefix,
             &["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"],
@@ -91,21 +91,14 @@ pub fn qemu() -> Result<PathBuf> {
         ]
         .concat();
         let mut command = Command::new(line[0]);
-        // what apt-get says must not mix with what we print for programs
-        command
-            .args(&line[1..])
-            .stdin(Stdio::null())
-            .stdout(io::stderr());
-        let status = command
-            .status()
-            .with_context(|| format!("cannot start `{}`", line.join(" ")))?;
-        interrupt::check()?;
-        ensure!(
-            status.success(),
-            "`{}` failed ({status}): see its messages above",
-            line.join(" ")
-        );
+        command.args(&line[1..]);
+        run(&mut command)
+    };
+    // a list that cannot be renewed may still do
+    if let Err(error) = apt_get(&["update"]) {
+        eprintln!("winder: {error:#}; trying to install all the same");
     }
+    apt_get(&INSTALL)?;
     on_path(QEMU)
         .with_context(|| format!("apt-get has installed {QEMU}, but it is not on the PATH"))
 }
@@ -116,19 +109,20 @@ pub fn target() -> Result<()> {
         return Ok(());
     }
     step(&format!("installing the Rust target {TARGET} (rustup)"));
-    let added = succeeds(
-        Command::new("rustup")
-            .args(["target", "add", TARGET])
-            .stdin(Stdio::null())
-            .stdout(io::stderr()),
-    );
+    let added = run(Command::new("rustup").args(["target", "add", TARGET]));
     interrupt::check()?;
-    ensure!(
-        added && has_target(),
-        "the Rust target {TARGET} is missing and `rustup target add {TARGET}` did not bring it: it needs rustup and the \
-         network. Without them, name a toolchain that has the target in the environment variable RUSTUP_TOOLCHAIN, \
-         then run this again"
-    );
+    added
+        .and_then(|()| {
+            ensure!(has_target(), "rustup has installed it for another toolchain than `rustc`'s");
+            Ok(())
+        })
+        .with_context(|| {
+            format!(
+                "the Rust target {TARGET} is missing: `rustup target add {TARGET}` brings it where there is rustup \
+                 and a network; elsewhere, name a toolchain that has it in the environment variable \
+                 RUSTUP_TOOLCHAIN; then run this again"
+            )
+        })?;
     Ok(())
 }
 
@@ -168,8 +162,7 @@ pub fn build(what: &str, arguments: &[&str], warnings: Warnings) -> Result<()> {
         warned |= line.starts_with("warning");
         eprintln!("{line}");
     }
-    let status = child.wait()?;
-    interrupt::check()?;
+    let status = interrupt::wait(&mut child)?;
     ensure!(
         status.success(),
         "cannot build {what} ({status}): see cargo's messages above"
@@ -177,6 +170,21 @@ pub fn build(what: &str, arguments: &[&str], warnings: Warnings) -> Result<()> {
     ensure!(
         !(warned && warnings == Warnings::Denied),
         "{what} compiles with warnings: see cargo's messages above"
+    );
+    Ok(())
+}
+
+/// Runs a program to its end; what it says goes to stderr, since stdout is for what we say to programs.
+pub fn run(command: &mut Command) -> Result<()> {
+    command.stdin(Stdio::null()).stdout(io::stderr());
+    let line = format!("{command:?}").replace('"', "");
+    let mut child = command
+        .spawn()
+        .with_context(|| format!("cannot start `{line}`"))?;
+    let status = interrupt::wait(&mut child)?;
+    ensure!(
+        status.success(),
+        "`{line}` failed ({status}): see its messages above"
     );
     Ok(())
 }
@@ -189,11 +197,9 @@ pub fn cargo() -> Command {
 }
 
 /// The workspace.
-pub fn root() -> PathBuf {
-    let package =
-        env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
-    let package = PathBuf::from(package);
-    package.parent().map_or(package.clone(), Path::to_owned)
+fn root() -> &'static Path {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    package.parent().unwrap_or(package)
 }
 
 fn built(parts: &[&str]) -> Result<PathBuf> {

@@ -12,6 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use model_core::image::{self, Direction, Kind, SIGNALS};
 use model_core::machine::Machine;
 
+use crate::interrupt::Interrupted;
 use crate::log::{Level, Log};
 use crate::plc::{self, Recipe, Sample};
 use crate::plot;
@@ -126,17 +127,25 @@ pub fn main(args: &Args) -> Result<ExitCode> {
     });
     progress.bar.finish_and_clear();
     let took = minutes(began.elapsed().as_secs_f64());
+    let outcome = outcome.or_else(|error| {
+        if !error.is::<Interrupted>() {
+            // a simulator that has ended says more than a broken connection does, after a moment to end in
+            thread::sleep(Duration::from_millis(200));
+            simulator.check()?;
+        }
+        Err(error)
+    });
+    drop(simulator);
     let files = write(&args.out, &title, &recipe, &samples)?;
-    if let Err(error) = outcome {
-        // a simulator that has ended tells more than a broken connection, after a moment to end in
-        thread::sleep(Duration::from_millis(200));
-        simulator.check()?;
-        return Err(error.context(format!(
-            "the set was not wound; what was recorded is in {files}"
-        )));
-    }
+    outcome.with_context(|| format!("the set was not wound; what was recorded is in {files}"))?;
     let report = Report::of(&recipe, &samples);
-    println!("{title}, wound in {took}:\n\n{report}\nPicture and data: {files}");
+    println!("{title}, wound in {took}:\n\n{report}");
+    if args.board == Board::Mps2 {
+        println!(
+            "  (QEMU counts 2 ns for every instruction: its times compare, but are no hardware's)\n"
+        );
+    }
+    println!("Picture and data: {files}");
     let missed = report.missed();
     if missed.is_empty() {
         return Ok(ExitCode::SUCCESS);

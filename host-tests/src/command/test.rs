@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use crate::interrupt;
 use crate::report::minutes;
@@ -64,11 +64,5 @@ pub fn main() -> Result<ExitCode> {
 }
 
 fn cargo(arguments: &[&str]) -> Result<()> {
-    let status = setup::cargo().args(arguments).status()?;
-    ensure!(
-        status.success(),
-        "`cargo {}` failed ({status})",
-        arguments.join(" ")
-    );
-    Ok(())
+    setup::run(setup::cargo().args(arguments))
 }
