@@ -196,6 +196,28 @@ pub fn cargo() -> Command {
     command
 }
 
+/// The minor version that a tool of the toolchain tells: 95 of `rustc 1.95.0 (…)` as of `clippy 0.1.95 (…)`.
+pub fn minor_version(program: &str, arguments: &[&str]) -> Result<u32> {
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .with_context(|| format!("cannot start {program}"))?;
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    let version = told.split_whitespace().nth(1).unwrap_or_default();
+    let numbers: Vec<_> = version.split('.').collect();
+    let minor = match numbers[..] {
+        ["0", "1", minor] | ["1", minor, _] => minor.parse().ok(),
+        _ => None,
+    };
+    minor.with_context(|| {
+        format!(
+            "`{program} {}` told no version: {told:?}",
+            arguments.join(" ")
+        )
+    })
+}
+
 /// The workspace.
 fn root() -> &'static Path {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -13,7 +13,9 @@ type Stage = (&'static str, fn() -> Result<()>);
 
 /// Installs what is missing and runs every test there is.
 pub fn main() -> Result<ExitCode> {
-    let stages: [Stage; 3] = [
+    let stages: [Stage; 5] = [
+        ("formatting", || cargo(&["fmt", "--all", "--check"])),
+        ("lints", lints),
         ("host tests", || cargo(&["test"])),
         ("firmware builds without warnings", || {
             setup::mps2_with(Warnings::Denied).map(drop)
@@ -61,6 +63,35 @@ pub fn main() -> Result<ExitCode> {
     }
     println!("winder test: FAILED after {time}: {}", failed.join(", "));
     Ok(ExitCode::FAILURE)
+}
+
+/// Clippy, which must be of the compiler's own version: with a toolchain put together from packages it may not be.
+fn lints() -> Result<()> {
+    let minor = |program, arguments: &[&str]| setup::minor_version(program, arguments);
+    let (rustc, clippy) = (minor("rustc", &["-V"])?, minor("cargo", &["clippy", "-V"])?);
+    if rustc != clippy {
+        eprintln!("winder: no lints: rustc is 1.{rustc}, clippy for 1.{clippy}");
+        return Ok(());
+    }
+    cargo(&["clippy", "--all-targets", "--", "-D", "warnings"])?;
+    let firmware = [
+        "clippy",
+        "--release",
+        "-p",
+        "board-mps2",
+        "--target",
+        setup::TARGET,
+    ];
+    cargo(&[&firmware[..], &["--", "-D", "warnings"]].concat())?;
+    cargo(&[
+        "clippy",
+        "--release",
+        "-p",
+        "qemu-pace",
+        "--",
+        "-D",
+        "warnings",
+    ])
 }
 
 fn cargo(arguments: &[&str]) -> Result<()> {
