@@ -1,1 +1,3 @@
 //! The simulator on the host.
+
+pub mod plant;
