@@ -3,8 +3,6 @@
 //! Not here: the process image, which is what a PLC sees. Each of these has one writer. The regulators get
 //! [`Measurements`] and cannot name the plant: what a drive cannot measure, they do not know.
 
-use crate::real::Real;
-
 /// A value for each driven section.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BySection<T> {
@@ -172,9 +170,4 @@ pub struct DriveStatus<R> {
     pub load: BySection<R>,
     /// Shaft powers, W.
     pub power: BySection<R>,
-}
-
-/// A difference of at most `tolerance`.
-pub fn near<R: Real>(a: R, b: R, tolerance: R) -> bool {
-    (a - b).abs() <= tolerance
 }

@@ -63,6 +63,17 @@ pub struct Bit {
     pub description: &'static str,
 }
 
+impl Bit {
+    /// From the columns of a table.
+    pub const fn new(number: u8, name: &'static str, description: &'static str) -> Self {
+        Self {
+            number,
+            name,
+            description,
+        }
+    }
+}
+
 /// How a signal stands in its words.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {

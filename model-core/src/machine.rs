@@ -32,9 +32,14 @@ impl Web {
     pub fn density_kg_m3(&self) -> f64 {
         self.grammage_kg_m2 / self.caliper_m
     }
-    /// Inertia of wound paper between two radii, J = ½·π·ρ·W·(R⁴ − R_inner⁴): the factor ½·π·ρ·W, kg/m.
+    /// ½·π·ρ·W, kg/m²: a solid roll of the web has the inertia ½·π·ρ·W·R⁴.
     pub fn inertia_factor(&self) -> f64 {
         0.5 * core::f64::consts::PI * self.density_kg_m3() * self.width_m
+    }
+    /// Inertia of a solid roll of the web, ½·π·ρ·W·R⁴, kg·m².
+    pub fn roll_inertia(&self, radius_m: f64) -> f64 {
+        let square = radius_m * radius_m;
+        self.inertia_factor() * square * square
     }
 }
 
@@ -148,6 +153,20 @@ pub struct Operation {
     pub front_share: [f64; 2],
 }
 
+impl IdleRoll {
+    /// Mass at the surface J/R², kg.
+    pub fn mass_kg(&self) -> f64 {
+        self.inertia_kg_m2 / (self.radius_m * self.radius_m)
+    }
+}
+
+impl DrivenRoll {
+    /// Mass at the surface J/R², kg.
+    pub fn mass_kg(&self) -> f64 {
+        self.inertia_kg_m2 / (self.radius_m * self.radius_m)
+    }
+}
+
 /// The winder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
@@ -208,8 +227,11 @@ impl core::error::Error for MachineError {}
 
 const SECONDS_PER_MINUTE: f64 = 60.0;
 
-/// Every preset by name.
-pub const PRESETS: &[(&str, fn() -> Machine)] = &[("NEWS-8000", Machine::news_8000)];
+/// A machine that ships, by name.
+pub type Preset = (&'static str, fn() -> Machine);
+
+/// Every preset.
+pub const PRESETS: &[Preset] = &[("NEWS-8000", Machine::news_8000)];
 
 impl Machine {
     /// The preset of a name.
@@ -486,6 +508,13 @@ impl Machine {
             check("operation.front_share", share, 0.0, 1.0)?;
         }
         check("encoder_pulses", self.encoder_pulses, 1.0, 1e5)
+    }
+
+    /// Inertia of the parent roll without its paper, as if the paper were solid to the axis: J_0 less what a solid
+    /// roll would have inside the spool, kg·m². With [`Web::roll_inertia`] it gives J_uw(R).
+    pub fn parent_roll_offset(&self) -> f64 {
+        let roll = &self.parent_roll;
+        roll.spool_inertia_kg_m2 - self.web.roll_inertia(roll.spool_radius_m)
     }
 
     /// Length of the web from the unwind to the rear drum, m.

@@ -57,38 +57,30 @@ pub mod zsw1 {
     pub const SETPOINT_REACHED: u16 = 1 << 10;
 }
 
-const fn bit(number: u8, name: &'static str, description: &'static str) -> Bit {
-    Bit {
-        number,
-        name,
-        description,
-    }
-}
-
 /// The bits of control word 1 by name.
 pub const STW1_BITS: &[Bit] = &[
-    bit(0, "on", "ON; 0 = OFF1, ramp down and switch off"),
-    bit(1, "no_coast", "0 = OFF2, coast stop"),
-    bit(2, "no_quick_stop", "0 = OFF3, quick stop"),
-    bit(3, "enable_operation", "enable operation"),
-    bit(4, "enable_ramp", "enable the ramp generator"),
-    bit(5, "unfreeze_ramp", "0 freezes the ramp generator"),
-    bit(6, "enable_setpoint", "enable the set-point"),
-    bit(7, "acknowledge", "rising edge acknowledges faults"),
-    bit(10, "control_by_plc", "the PLC has control"),
+    Bit::new(0, "on", "ON; 0 = OFF1, ramp down and switch off"),
+    Bit::new(1, "no_coast", "0 = OFF2, coast stop"),
+    Bit::new(2, "no_quick_stop", "0 = OFF3, quick stop"),
+    Bit::new(3, "enable_operation", "enable operation"),
+    Bit::new(4, "enable_ramp", "enable the ramp generator"),
+    Bit::new(5, "unfreeze_ramp", "0 freezes the ramp generator"),
+    Bit::new(6, "enable_setpoint", "enable the set-point"),
+    Bit::new(7, "acknowledge", "rising edge acknowledges faults"),
+    Bit::new(10, "control_by_plc", "the PLC has control"),
 ];
 
 /// The bits of status word 1 by name.
 pub const ZSW1_BITS: &[Bit] = &[
-    bit(0, "ready_to_switch_on", "ready to switch on"),
-    bit(1, "ready_to_operate", "switched on"),
-    bit(2, "operation_enabled", "the drive follows its set-point"),
-    bit(3, "fault", "a fault is present"),
-    bit(4, "no_coast", "0 = OFF2 is active"),
-    bit(5, "no_quick_stop", "0 = OFF3 is active"),
-    bit(6, "switching_on_inhibited", "ON must be taken back first"),
-    bit(7, "warning", "a warning is present"),
-    bit(8, "speed_within_tolerance", "speed error within tolerance"),
-    bit(9, "control_requested", "the PLC is asked to take control"),
-    bit(10, "setpoint_reached", "speed set-point reached"),
+    Bit::new(0, "ready_to_switch_on", "ready to switch on"),
+    Bit::new(1, "ready_to_operate", "switched on"),
+    Bit::new(2, "operation_enabled", "the drive follows its set-point"),
+    Bit::new(3, "fault", "a fault is present"),
+    Bit::new(4, "no_coast", "0 = OFF2 is active"),
+    Bit::new(5, "no_quick_stop", "0 = OFF3 is active"),
+    Bit::new(6, "switching_on_inhibited", "ON must be taken back first"),
+    Bit::new(7, "warning", "a warning is present"),
+    Bit::new(8, "speed_within_tolerance", "speed error within tolerance"),
+    Bit::new(9, "control_requested", "the PLC is asked to take control"),
+    Bit::new(10, "setpoint_reached", "speed set-point reached"),
 ];

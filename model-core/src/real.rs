@@ -59,6 +59,10 @@ pub trait Real:
     fn clamp(self, low: Self, high: Self) -> Self {
         self.max(low).min(high)
     }
+    /// At most `tolerance` away.
+    fn is_near(self, other: Self, tolerance: Self) -> bool {
+        (self - other).abs() <= tolerance
+    }
     /// The nearest number in `−bound ..= bound`.
     fn limit(self, bound: Self) -> Self {
         self.clamp(-bound, bound)

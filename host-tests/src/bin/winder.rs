@@ -1,2 +1,60 @@
-//! The command line tool.
-fn main() {}
+//! `winder`: the one command line tool of the simulator.
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use host_tests::command::{demo, run, signals, test};
+use host_tests::interrupt::{self, Interrupted};
+
+/// A winder for a PLC to control: unwind, web, drums, shipping roll and their electric drives, simulated in real
+/// time on a microcontroller, in QEMU or on this PC.
+#[derive(Debug, Parser)]
+#[command(name = "cargo winder", bin_name = "cargo winder", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Wind a set of paper: start the simulator, command it as a winder PLC would, show what came of it
+    ///
+    /// Installs and builds what is missing. Exit status 1: a limit was missed, or the set was not wound.
+    Demo(demo::Args),
+    /// Run the simulator alone, for your PLC
+    ///
+    /// Prints `ready modbus=ADDRESS:PORT` on a line of its own once it answers; ends with Ctrl-C.
+    Run(run::Args),
+    /// Install what is missing and run every test, on the host and in QEMU
+    Test,
+    /// Print the signal list as CSV
+    Signals,
+}
+
+/// What a shell says of a program that Ctrl-C has ended: 128 + SIGINT.
+const INTERRUPTED: u8 = 130;
+
+fn main() -> ExitCode {
+    run(Cli::parse()).unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::from(if error.is::<Interrupted>() {
+            INTERRUPTED
+        } else {
+            1
+        })
+    })
+}
+
+fn run(cli: Cli) -> Result<ExitCode> {
+    if matches!(cli.command, Command::Signals) {
+        return signals::main();
+    }
+    interrupt::install()?;
+    match cli.command {
+        Command::Demo(args) => demo::main(&args),
+        Command::Run(args) => run::main(args),
+        Command::Test => test::main(),
+        Command::Signals => signals::main(),
+    }
+}

@@ -1,10 +1,10 @@
 //! The offline run: what a schedule gives in a file.
 
 use std::fs;
-use std::path::PathBuf;
 
 use host_tests::plant::{self, Options, Scalar};
 use model_core::machine::Machine;
+use tempfile::TempDir;
 
 use crate::form::{self, Bench, H};
 use crate::near;
@@ -12,20 +12,19 @@ use crate::near;
 const HEADER: &str = "t_s,T_uw,T_rd,T_fd,T_rr";
 const COLUMNS: &str = "t_s,v_uw,v_gr,v_sr,v_rd,t_uw,t_gr,t_sr,r_uw,r_wu";
 
-/// Files of one test.
-fn options(name: &str, schedule: &str) -> Options {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
-    fs::create_dir_all(&folder).unwrap();
+/// A folder with a schedule, and what to do with it.
+fn options(schedule: &str) -> (TempDir, Options) {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path();
     let options = Options {
-        schedule: folder.join("schedule.csv"),
-        out: folder.join("out.csv"),
+        schedule: path.join("schedule.csv"),
+        out: path.join("out.csv"),
         machine: "NEWS-8000".into(),
         scalar: Scalar::F64,
         every_s: 1.0,
     };
     fs::write(&options.schedule, schedule).unwrap();
-    let _ = fs::remove_file(&options.out);
-    options
+    (folder, options)
 }
 
 fn table(text: &str) -> Vec<Vec<f64>> {
@@ -46,10 +45,9 @@ fn run(options: &Options) -> Vec<Vec<f64>> {
 
 #[test]
 fn the_run_starts_at_stall_tension_and_ends_with_the_last_row() {
-    let options = options(
-        "start",
-        &format!("{HEADER}\n0,-1260,0,0,0\n0.5,0,0,0,0\n3.5,1e6,0,0,0\n"),
-    );
+    let (_folder, options) = options(&format!(
+        "{HEADER}\n0,-1260,0,0,0\n0.5,0,0,0,0\n3.5,1e6,0,0,0\n"
+    ));
     let table = run(&options);
     let times: Vec<_> = table.iter().map(|row| row[0]).collect();
     assert_eq!(times, [0.0, 1.0, 2.0, 3.0]);
@@ -68,8 +66,8 @@ fn numbers_round_trip() {
     let schedule = format!(
         "{HEADER},brake_uw\n0,-1000,400,400,0,0\n0.1,0,500,600,1,0\n1,0,0,0,0,1\n2,0,0,0,0,1"
     );
-    for (scalar, name) in [(Scalar::F32, "f32"), (Scalar::F64, "f64")] {
-        let mut options = options(name, &schedule);
+    for scalar in [Scalar::F32, Scalar::F64] {
+        let (_folder, mut options) = options(&schedule);
         (options.scalar, options.every_s) = (scalar, 0.1);
         let table = run(&options);
         assert_eq!(table.len(), 21);
@@ -121,7 +119,7 @@ fn by_hand<R: model_core::real::Real>() -> Vec<Vec<f64>> {
 
 #[test]
 fn a_dash_prints_the_table() {
-    let mut options = options("dash", &format!("{HEADER}\n0,0,0,0,0\n1,0,0,0,0"));
+    let (_folder, mut options) = options(&format!("{HEADER}\n0,0,0,0,0\n1,0,0,0,0"));
     options.out = "-".into();
     let mut console = Vec::new();
     plant::run(&options, &mut console).unwrap();
@@ -150,7 +148,7 @@ fn what_is_refused_leaves_no_file() {
         ("period", &good, |o| o.every_s = H / 2.0, "--every 0.002 "),
     ];
     for (name, schedule, change, reason) in cases {
-        let mut options = options(name, schedule);
+        let (_folder, mut options) = options(schedule);
         change(&mut options);
         let mut console = Vec::new();
         let error = format!("{:#}", plant::run(&options, &mut console).unwrap_err());

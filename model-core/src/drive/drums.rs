@@ -58,9 +58,6 @@ impl<R: Real> Drums<R> {
     /// The speed loop is set by the symmetrical optimum and then slowed to a third of the first web mode, so
     /// that it does not work against the web.
     pub fn new(machine: &Machine, period: f64) -> Self {
-        let mass = |roll: &crate::machine::DrivenRoll| {
-            roll.inertia_kg_m2 / (roll.radius_m * roll.radius_m)
-        };
         let (rd, fd, rr) = (&machine.rear_drum, &machine.front_drum, &machine.rider_roll);
         let shipping = &machine.shipping_roll;
         let (d_core, d_full) = (2.0 * shipping.core_radius_m, 2.0 * shipping.full_radius_m);
@@ -79,13 +76,13 @@ impl<R: Real> Drums<R> {
                 r_rd: r(rd.radius_m),
                 r_fd: r(fd.radius_m),
                 r_rr: r(rr.radius_m),
-                drum_mass: r(mass(rd) + mass(fd) + mass(rr)),
+                drum_mass: r(rd.mass_kg() + fd.mass_kg() + rr.mass_kg()),
                 roll_mass: r(machine.web.inertia_factor() / 4.0),
                 friction: r(rd.friction_n_s_m
                     + fd.friction_n_s_m
                     + rr.friction_n_s_m
                     + shipping.friction_n_s_m),
-                rider_mass: r(mass(rr)),
+                rider_mass: r(rr.mass_kg()),
                 rider_friction: r(rr.friction_n_s_m),
                 gains_per_mass: symmetrical_optimum(
                     (super::first_web_mode(machine) / 3.0).min(super::fastest_crossover()),

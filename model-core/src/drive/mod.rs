@@ -178,11 +178,9 @@ fn web_stiffness(machine: &Machine) -> f64 {
 
 /// First web mode with the drums held and a full parent roll, √(k·R²/J), rad/s.
 fn first_web_mode(machine: &Machine) -> f64 {
-    let roll = &machine.parent_roll;
-    let power4 = |r: f64| (r * r) * (r * r);
-    let inertia = roll.spool_inertia_kg_m2
-        + machine.web.inertia_factor() * (power4(roll.full_radius_m) - power4(roll.spool_radius_m));
-    libm::sqrt(web_stiffness(machine) / inertia) * roll.full_radius_m
+    let full = machine.parent_roll.full_radius_m;
+    let inertia = machine.parent_roll_offset() + machine.web.roll_inertia(full);
+    libm::sqrt(web_stiffness(machine) / inertia) * full
 }
 
 /// The crossover that sampling allows, 1/(a·T_σ), rad/s.

@@ -93,23 +93,17 @@ pub struct UnwindTask<R> {
 impl<R: Real> Unwind<R> {
     /// For a machine, stepped every `period` seconds.
     pub fn new(machine: &Machine, period: f64) -> Self {
-        let (web, roll) = (&machine.web, &machine.parent_roll);
-        let factor = web.inertia_factor();
-        let spool = roll.spool_radius_m * roll.spool_radius_m;
         let path = &machine.idle[..=machine.load_cell_roll];
         let stiffness = super::web_stiffness(machine);
         let r = R::of;
         Self {
             c: Coefficients {
                 motor: Motor::new(&machine.motors.uw),
-                inertia_factor: r(factor),
-                inertia_offset: r(roll.spool_inertia_kg_m2 - factor * spool * spool),
-                friction: r(roll.friction_n_s_m),
-                path_mass: r(path
-                    .iter()
-                    .map(|i| i.inertia_kg_m2 / (i.radius_m * i.radius_m))
-                    .sum()),
-                path_friction: r(path.iter().map(|i| i.friction_n_s_m).sum()),
+                inertia_factor: r(machine.web.inertia_factor()),
+                inertia_offset: r(machine.parent_roll_offset()),
+                friction: r(machine.parent_roll.friction_n_s_m),
+                path_mass: r(path.iter().map(|roll| roll.mass_kg()).sum()),
+                path_friction: r(path.iter().map(|roll| roll.friction_n_s_m).sum()),
                 web_stiffness: r(stiffness),
                 tension_gains: Gains {
                     proportional: r(TENSION_GAIN),

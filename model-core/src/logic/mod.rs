@@ -15,7 +15,7 @@ pub use section::{Demand, Section, State};
 pub use words::{COMMAND_BITS, Fault, Mode, Refusal, STATUS_BITS, command, status};
 
 use crate::exchange::{
-    Brakes, BySection, DriveCommand, DriveStatus, Handling, Measurements, UnwindControl, near,
+    Brakes, BySection, DriveCommand, DriveStatus, Handling, Measurements, UnwindControl,
 };
 use crate::image::{self, Commands, Feedback};
 use crate::machine::Machine;
@@ -171,9 +171,9 @@ impl<R: Real> Logic<R> {
 
     fn standstill(&self, drive: &DriveStatus<R>) -> bool {
         let zero = self.c.zero_speed;
-        near(drive.v_ref, R::ZERO, zero)
-            && near(drive.v, R::ZERO, zero)
-            && near(drive.v_uw, R::ZERO, zero)
+        drive.v_ref.is_near(R::ZERO, zero)
+            && drive.v.is_near(R::ZERO, zero)
+            && drive.v_uw.is_near(R::ZERO, zero)
     }
 
     fn rising(&self, sight: &Sight<R>, bit: u16) -> bool {
@@ -537,11 +537,11 @@ impl<R: Real> Logic<R> {
         f.set_word(&image::FAULT, self.fault as u16);
 
         let set = sight.commands.get::<R>(&image::V_SET) * R::of(1.0 / 60.0);
-        let at_speed = self.mode == Mode::Run && near(d.v, set, c.speed_tolerance);
+        let at_speed = self.mode == Mode::Run && d.v.is_near(set, c.speed_tolerance);
         f.set_word(&image::WINDER_STATUS, self.status(sight, at_speed));
         let fault = self.fault == Fault::HeartbeatLost;
         let mut speed = 0;
-        if near(d.v, d.v_ref, c.speed_tolerance) {
+        if d.v.is_near(d.v_ref, c.speed_tolerance) {
             speed |= zsw1::SPEED_WITHIN_TOLERANCE;
         }
         if at_speed {

@@ -2,14 +2,6 @@
 
 use crate::image::Bit;
 
-const fn bit(number: u8, name: &'static str, description: &'static str) -> Bit {
-    Bit {
-        number,
-        name,
-        description,
-    }
-}
-
 /// Bits of the winder's command word.
 pub mod command {
     /// Thread: a rising edge starts it, 0 ends it.
@@ -64,36 +56,36 @@ pub mod status {
 
 /// The bits of the command word by name.
 pub const COMMAND_BITS: &[Bit] = &[
-    bit(0, "thread", "rising edge starts thread; 0 ends it"),
-    bit(
+    Bit::new(0, "thread", "rising edge starts thread; 0 ends it"),
+    Bit::new(
         1,
         "stall",
         "rising edge puts stall tension on the standing web; 0 takes it off",
     ),
-    bit(2, "run", "rising edge starts run; 0 is a normal stop"),
-    bit(
+    Bit::new(2, "run", "rising edge starts run; 0 is a normal stop"),
+    Bit::new(
         3,
         "preset_accept",
         "rising edge takes over the unwind's diameter preset",
     ),
-    bit(
+    Bit::new(
         4,
         "web_threaded",
         "rising edge: the operator has led the web through the machine",
     ),
-    bit(5, "drum_brakes", "closes the drum brakes at standstill"),
-    bit(6, "acknowledge", "rising edge acknowledges faults"),
-    bit(
+    Bit::new(5, "drum_brakes", "closes the drum brakes at standstill"),
+    Bit::new(6, "acknowledge", "rising edge acknowledges faults"),
+    Bit::new(
         7,
         "new_core",
         "rising edge: the operator has put in an empty core",
     ),
-    bit(
+    Bit::new(
         8,
         "new_parent_roll",
         "rising edge: the operator has put in a full parent roll",
     ),
-    bit(
+    Bit::new(
         9,
         "reset_times",
         "rising edge forgets the worst task times and overruns",
@@ -102,22 +94,22 @@ pub const COMMAND_BITS: &[Bit] = &[
 
 /// The bits of the status word by name.
 pub const STATUS_BITS: &[Bit] = &[
-    bit(0, "drives_on", "all drives follow their set-points"),
-    bit(1, "tension_detected", "the web is under tension"),
-    bit(2, "web_threaded", "the web is led through the machine"),
-    bit(
+    Bit::new(0, "drives_on", "all drives follow their set-points"),
+    Bit::new(1, "tension_detected", "the web is under tension"),
+    Bit::new(2, "web_threaded", "the web is led through the machine"),
+    Bit::new(
         3,
         "web_break",
         "a web break has been detected and not acknowledged",
     ),
-    bit(4, "at_speed", "the web runs at its set speed"),
-    bit(5, "zero_speed", "the web stands still"),
-    bit(6, "brake_uw", "the unwind's brake is closed"),
-    bit(7, "brake_rd", "the rear drum's brake is closed"),
-    bit(8, "brake_fd", "the front drum's brake is closed"),
-    bit(9, "preset_taken", "a diameter preset has been taken over"),
-    bit(10, "fault", "a fault is latched"),
-    bit(11, "refused", "the last command was refused"),
+    Bit::new(4, "at_speed", "the web runs at its set speed"),
+    Bit::new(5, "zero_speed", "the web stands still"),
+    Bit::new(6, "brake_uw", "the unwind's brake is closed"),
+    Bit::new(7, "brake_rd", "the rear drum's brake is closed"),
+    Bit::new(8, "brake_fd", "the front drum's brake is closed"),
+    Bit::new(9, "preset_taken", "a diameter preset has been taken over"),
+    Bit::new(10, "fault", "a fault is latched"),
+    Bit::new(11, "refused", "the last command was refused"),
 ];
 
 /// Writes an enum of codes with their texts from one table.

@@ -18,7 +18,7 @@ impl<R: Real> Idle<R> {
     /// From its description.
     pub fn new(roll: &IdleRoll) -> Self {
         Self {
-            per_mass: R::of(roll.radius_m * roll.radius_m / roll.inertia_kg_m2),
+            per_mass: R::of(1.0 / roll.mass_kg()),
             friction: R::of(roll.friction_n_s_m),
         }
     }
@@ -46,11 +46,10 @@ pub struct Unwind<R> {
 impl<R: Real> Unwind<R> {
     /// From the machine's description.
     pub fn new(machine: &Machine) -> Self {
-        let (roll, factor) = (&machine.parent_roll, machine.web.inertia_factor());
         Self {
-            inertia_factor: R::of(factor),
-            inertia_offset: R::of(roll.spool_inertia_kg_m2 - factor * roll.spool_radius_m.powi4()),
-            friction: R::of(roll.friction_n_s_m),
+            inertia_factor: R::of(machine.web.inertia_factor()),
+            inertia_offset: R::of(machine.parent_roll_offset()),
+            friction: R::of(machine.parent_roll.friction_n_s_m),
             layer: R::of(machine.web.caliper_m / core::f64::consts::TAU),
         }
     }
@@ -74,17 +73,5 @@ impl<R: Real> Unwind<R> {
     #[inline(always)]
     pub fn radius_rate(&self, omega: R) -> R {
         -(self.layer * omega)
-    }
-}
-
-/// Fourth powers for coefficients.
-pub(crate) trait Powi4 {
-    /// x⁴
-    fn powi4(self) -> Self;
-}
-
-impl Powi4 for f64 {
-    fn powi4(self) -> f64 {
-        (self * self) * (self * self)
     }
 }

@@ -3,7 +3,7 @@
 //! Not here: noise, and sensors that fail.
 
 use crate::exchange::{BySection, Measurements};
-use crate::machine::Machine;
+use crate::machine::{DrivenRoll, Machine};
 use crate::real::Real;
 
 /// Coefficients of the sensors.
@@ -43,7 +43,7 @@ pub struct Sight<R> {
 impl<R: Real> Sensors<R> {
     /// The sensors of a machine, looked at every `h` seconds.
     pub fn new(machine: &Machine, h: f64) -> Self {
-        let per_radius = |roll: &crate::machine::DrivenRoll| R::of(1.0 / roll.radius_m);
+        let per_radius = |roll: &DrivenRoll| R::of(1.0 / roll.radius_m);
         let circumference = core::f64::consts::TAU * machine.rear_drum.radius_m;
         Self {
             coefficients: Coefficients {

@@ -2,7 +2,6 @@
 //!
 //! Not here: slip at the nips, the rider roll's load, wound-on tension.
 
-use super::roll::Powi4;
 use crate::machine::Machine;
 use crate::real::Real;
 
@@ -36,18 +35,13 @@ impl<R: Real> Windup<R> {
     /// From the machine's description.
     pub fn new(machine: &Machine) -> Self {
         let driven = [&machine.rear_drum, &machine.front_drum, &machine.rider_roll];
-        let mass: f64 = driven
-            .iter()
-            .map(|roll| roll.inertia_kg_m2 / (roll.radius_m * roll.radius_m))
-            .sum();
         let friction: f64 = driven.iter().map(|roll| roll.friction_n_s_m).sum();
         let roll = &machine.shipping_roll;
-        let factor = machine.web.inertia_factor();
         Self {
-            drum_mass: R::of(mass),
+            drum_mass: R::of(driven.iter().map(|roll| roll.mass_kg()).sum()),
             friction: R::of(friction + roll.friction_n_s_m),
-            inertia_factor: R::of(factor),
-            core_inertia: R::of(factor * roll.core_radius_m.powi4()),
+            inertia_factor: R::of(machine.web.inertia_factor()),
+            core_inertia: R::of(machine.web.roll_inertia(roll.core_radius_m)),
             layer: R::of(machine.web.caliper_m / core::f64::consts::TAU),
             per_radius: driven.map(|roll| R::of(1.0 / roll.radius_m)),
         }

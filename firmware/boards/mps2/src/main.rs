@@ -1,2 +1,78 @@
-//! Placeholder.
-fn main() {}
+//! The paper winder simulator on QEMU's `mps2-an500`, a Cortex-M7 with Ethernet, for any PC.
+//!
+//! Does not compute anything: the tasks are the library's. This crate starts the machine and
+//! gives the tasks their priorities, their clock and their network.
+
+#![no_std]
+#![no_main]
+// The web server's task has a deep type.
+#![recursion_limit = "256"]
+// Interrupt handlers call into their executors.
+#![allow(unsafe_code)]
+
+mod failure;
+mod interrupts;
+mod lan9118;
+mod net;
+mod pace;
+mod register;
+mod simulator;
+mod time_driver;
+mod uart_log;
+
+use embassy_executor::InterruptExecutor;
+use embassy_time::{Duration, Instant};
+use interrupts::Interrupt;
+
+static PLANT: InterruptExecutor = InterruptExecutor::new();
+static DRIVE: InterruptExecutor = InterruptExecutor::new();
+static BACKGROUND: InterruptExecutor = InterruptExecutor::new();
+
+extern "C" fn on_plant() {
+    // SAFETY: this is the executor's interrupt, which only `start` enables.
+    unsafe { PLANT.on_interrupt() }
+}
+
+extern "C" fn on_drive() {
+    // SAFETY: as for the plant.
+    unsafe { DRIVE.on_interrupt() }
+}
+
+extern "C" fn on_background() {
+    // SAFETY: as for the plant.
+    unsafe { BACKGROUND.on_interrupt() }
+}
+
+/// From switching on to the first activation of the timed tasks.
+const SETTLING: Duration = Duration::from_millis(10);
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let Some(mut core) = cortex_m::Peripherals::take() else {
+        unreachable!("the entry point runs once")
+    };
+    failure::guard_stack(&mut core.MPU);
+    uart_log::start();
+    interrupts::set_priorities(&mut core.NVIC);
+    time_driver::start();
+
+    // Before any task runs, so that nothing preempts it: this is as good as the background.
+    defmt::info!(
+        "paper winder simulator {=str} on mps2-an500",
+        env!("CARGO_PKG_VERSION")
+    );
+
+    let start = Instant::now() + SETTLING;
+    let plant = PLANT.start(Interrupt::Plant);
+    let drive = DRIVE.start(Interrupt::Drive);
+    let background = BACKGROUND.start(Interrupt::Background);
+    let exchange = simulator::exchange();
+    plant.spawn(simulator::plant(start, exchange).expect("first"));
+    drive.spawn(simulator::drive(start, exchange).expect("first"));
+    background.spawn(simulator::background(exchange).expect("first"));
+
+    // Not an executor: embassy's idles in WFE, on which QEMU spins.
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

@@ -1,0 +1,89 @@
+//! The interrupts that the firmware uses, their priorities, and the vector table.
+//!
+//! Does not handle any interrupt: the handlers stand with what they serve.
+//!
+//! # Who may preempt whom
+//!
+//! The plant preempts the drive, the drive preempts the background, and that is all there is:
+//!
+//! - The time driver's alarm has the plant's priority. It would interrupt the plant only to wake
+//!   tasks that have to wait for the plant anyway. Both pending, the lower number goes first, so
+//!   the alarm that is due delays the plant by its own few instructions and nothing else does.
+//! - The Ethernet has the background's priority. All it does is wake the network's task, which
+//!   runs there: it never disturbs a timed task, and it never meets the driver half-way.
+//!
+//! The steps are multiples of 0x10, so that they hold also where the core has four priority bits.
+
+// The vector table is placed by section, and interrupt numbers are a promise to the compiler.
+#![allow(unsafe_code)]
+
+use cortex_m::interrupt::InterruptNumber;
+use cortex_m::peripheral::NVIC;
+
+/// Interrupts by their number in the NVIC (Arm AN500 and its QEMU model).
+#[derive(Clone, Copy)]
+#[repr(u16)]
+pub enum Interrupt {
+    /// One-shot alarm of the time driver.
+    Timer0 = 8,
+    /// LAN9118.
+    Ethernet = 13,
+    /// No device's: runs the plant's executor.
+    Plant = 28,
+    /// No device's: runs the drive's executor.
+    Drive = 29,
+    /// No device's: runs the background's executor.
+    Background = 30,
+}
+
+// SAFETY: the discriminants are the numbers of the NVIC, and no two are the same.
+unsafe impl InterruptNumber for Interrupt {
+    fn number(self) -> u16 {
+        self as u16
+    }
+}
+
+impl Interrupt {
+    /// The lower, the more urgent.
+    const fn priority(self) -> u8 {
+        match self {
+            Self::Timer0 | Self::Plant => 0x10,
+            Self::Drive => 0x20,
+            Self::Ethernet | Self::Background => 0x30,
+        }
+    }
+}
+
+/// Gives every interrupt its priority; enables none.
+pub fn set_priorities(nvic: &mut NVIC) {
+    use Interrupt::{Background, Drive, Ethernet, Plant, Timer0};
+    for interrupt in [Timer0, Ethernet, Plant, Drive, Background] {
+        // SAFETY: no critical section of this firmware is based on priorities.
+        unsafe { nvic.set_priority(interrupt, interrupt.priority()) };
+    }
+}
+
+/// Lets an interrupt through that has its priority and whose handler is ready.
+pub fn enable(interrupt: Interrupt) {
+    // SAFETY: as for `set_priorities`.
+    unsafe { NVIC::unmask(interrupt) };
+}
+
+type Vector = unsafe extern "C" fn();
+
+unsafe extern "C" {
+    fn DefaultHandler();
+}
+
+/// The interrupt part of the vector table, by the name that cortex-m-rt expects.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+static __INTERRUPTS: [Vector; 32] = {
+    let mut table: [Vector; 32] = [DefaultHandler; 32];
+    table[Interrupt::Timer0 as usize] = crate::time_driver::on_alarm;
+    table[Interrupt::Ethernet as usize] = crate::lan9118::on_interrupt;
+    table[Interrupt::Plant as usize] = crate::on_plant;
+    table[Interrupt::Drive as usize] = crate::on_drive;
+    table[Interrupt::Background as usize] = crate::on_background;
+    table
+};

@@ -1,0 +1,97 @@
+//! The simulator's tasks on this board: the library's, given their place.
+//!
+//! Does not compute anything and does not know the machine beyond its preset.
+
+// A task that spawns on its own executor needs embassy's unsafe spawner.
+#![allow(unsafe_code)]
+
+use core::cell::RefCell;
+
+use embassy_executor::Spawner;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_time::Instant;
+use firmware::journal::Journal;
+use firmware::link::ImageCell;
+use firmware::tasks::{self, Exchange};
+use firmware::{SPANS, Scalar};
+use model_core::drive::Drive;
+use model_core::image::{Commands, Feedback, Image};
+use model_core::logic::{Fault, Logic, Mode, Refusal};
+use model_core::machine::Machine;
+use model_core::simulator::Plant;
+use static_cell::StaticCell;
+
+/// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
+pub type LocalImage = ImageCell<NoopRawMutex>;
+
+/// What the tasks share, made once.
+pub fn exchange() -> &'static Exchange {
+    static EXCHANGE: StaticCell<Exchange> = StaticCell::new();
+    EXCHANGE.init(Exchange::default())
+}
+
+fn machine() -> Machine {
+    Machine::news_8000()
+}
+
+/// The plant, every 4 ms.
+#[embassy_executor::task]
+pub async fn plant(start: Instant, exchange: &'static Exchange) {
+    match Plant::<Scalar, SPANS>::new(&machine()) {
+        Ok(mut plant) => tasks::plant(start, &mut plant, exchange).await,
+        Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
+    }
+}
+
+/// The regulators, every 10 ms.
+#[embassy_executor::task]
+pub async fn drive(start: Instant, exchange: &'static Exchange) {
+    tasks::drive(start, &mut Drive::new(&machine()), exchange).await;
+}
+
+/// Everything that may wait: logic, network, and the beat for the pace.
+#[embassy_executor::task]
+pub async fn background(exchange: &'static Exchange) {
+    static IMAGE: StaticCell<LocalImage> = StaticCell::new();
+
+    let image = &*IMAGE.init(ImageCell::new(RefCell::new(Image {
+        commands: Commands::of(&machine()),
+        feedback: Feedback::default(),
+    })));
+    // SAFETY: an embassy executor polls this task.
+    let spawner = unsafe { Spawner::for_current_executor() }.await;
+    spawner.spawn(logic(exchange, image).expect("first"));
+    spawner.spawn(crate::pace::pace().expect("first"));
+    crate::net::start(spawner, image);
+}
+
+#[embassy_executor::task]
+async fn logic(exchange: &'static Exchange, image: &'static LocalImage) {
+    let mut logic = Logic::new(&machine());
+    tasks::logic(&mut logic, exchange, image, &mut Log).await;
+}
+
+/// The journal goes to the log: commands for a replay, states for people.
+struct Log;
+
+impl Journal for Log {
+    fn command(&mut self, cycle: u32, word: u16, value: u16) {
+        defmt::debug!("command {=u32} {=u16} {=u16}", cycle, word, value);
+    }
+
+    fn state(&mut self, _: u32, mode: Mode, fault: Fault, refusal: Refusal) {
+        match (fault, refusal) {
+            (Fault::None, Refusal::None) => defmt::info!("{=str}", mode.name()),
+            (Fault::None, _) => {
+                defmt::warn!("{=str}; refused: {=str}", mode.name(), refusal.name())
+            }
+            (_, Refusal::None) => defmt::error!("{=str}; fault: {=str}", mode.name(), fault.name()),
+            (_, _) => defmt::error!(
+                "{=str}; fault: {=str}; refused: {=str}",
+                mode.name(),
+                fault.name(),
+                refusal.name()
+            ),
+        }
+    }
+}

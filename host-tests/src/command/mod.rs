@@ -1,0 +1,6 @@
+//! The subcommands of `winder`, a module each.
+
+pub mod demo;
+pub mod run;
+pub mod signals;
+pub mod test;

@@ -1,0 +1,55 @@
+//! `winder run`
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+use std::thread;
+use std::time::Duration;
+
+use anyhow::Result;
+
+use crate::interrupt::{self, Interrupted};
+use crate::log::{Level, Log};
+use crate::simulator::{Board, Options, Simulator};
+
+/// How to run the simulator.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct Args {
+    /// What the simulator runs on
+    #[arg(long, value_enum, default_value_t = Board::Mps2)]
+    board: Board,
+    /// Port of 127.0.0.1 for Modbus TCP; 0 takes any free one
+    #[arg(long, default_value_t = 0)]
+    port: u16,
+    /// Simulated time over real time
+    #[arg(long, default_value_t = 1.0)]
+    pace: f64,
+}
+
+/// Runs the simulator until Ctrl-C; your PLC does the rest.
+pub fn main(args: Args) -> Result<ExitCode> {
+    match serve(args) {
+        Err(error) if error.is::<Interrupted>() => Ok(ExitCode::SUCCESS),
+        other => other.map(|()| ExitCode::SUCCESS),
+    }
+}
+
+fn serve(args: Args) -> Result<()> {
+    let options = Options {
+        port: args.port,
+        pace: args.pace,
+        log: Log::new(|line| {
+            if line.level >= Level::Info {
+                eprintln!("{line}");
+            }
+        }),
+    };
+    let mut simulator = Simulator::start(args.board, options)?;
+    let mut out = io::stdout().lock();
+    writeln!(out, "ready modbus={}", simulator.address())?;
+    out.flush()?;
+    loop {
+        interrupt::check()?;
+        simulator.check()?;
+        thread::sleep(Duration::from_millis(100));
+    }
+}

@@ -1,0 +1,99 @@
+//! `winder test`
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::Result;
+
+use crate::interrupt;
+use crate::report::minutes;
+use crate::setup::{self, Warnings};
+
+type Stage = (&'static str, fn() -> Result<()>);
+
+/// Installs what is missing and runs every test there is.
+pub fn main() -> Result<ExitCode> {
+    let stages: [Stage; 5] = [
+        ("formatting", || cargo(&["fmt", "--all", "--check"])),
+        ("lints", lints),
+        ("host tests", || cargo(&["test"])),
+        ("firmware builds without warnings", || {
+            setup::mps2_with(Warnings::Denied).map(drop)
+        }),
+        ("QEMU end to end", || {
+            cargo(&[
+                "test",
+                "--release",
+                "-p",
+                "host-tests",
+                "--features",
+                "qemu",
+                "--test",
+                "qemu",
+            ])
+        }),
+    ];
+    // what needs the network first: better no start than a late stop
+    setup::qemu()?;
+    setup::target()?;
+    let began = Instant::now();
+    let mut failed = Vec::new();
+    let mut summary = String::new();
+    for (name, stage) in stages {
+        let stage_began = Instant::now();
+        eprintln!("winder: {name} …");
+        let outcome = stage();
+        interrupt::check()?;
+        let verdict = match outcome {
+            Ok(()) => "ok",
+            Err(error) => {
+                eprintln!("winder: {error:#}");
+                failed.push(name);
+                "FAILED"
+            }
+        };
+        let time = minutes(stage_began.elapsed().as_secs_f64());
+        summary += &format!("  {name:34} {verdict:6} {time}\n");
+    }
+    let time = minutes(began.elapsed().as_secs_f64());
+    print!("\n{summary}");
+    if failed.is_empty() {
+        println!("winder test: all passed in {time}");
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("winder test: FAILED after {time}: {}", failed.join(", "));
+    Ok(ExitCode::FAILURE)
+}
+
+/// Clippy, which must be of the compiler's own version: with a toolchain put together from packages it may not be.
+fn lints() -> Result<()> {
+    let minor = |program, arguments: &[&str]| setup::minor_version(program, arguments);
+    let (rustc, clippy) = (minor("rustc", &["-V"])?, minor("cargo", &["clippy", "-V"])?);
+    if rustc != clippy {
+        eprintln!("winder: no lints: rustc is 1.{rustc}, clippy for 1.{clippy}");
+        return Ok(());
+    }
+    cargo(&["clippy", "--all-targets", "--", "-D", "warnings"])?;
+    let firmware = [
+        "clippy",
+        "--release",
+        "-p",
+        "board-mps2",
+        "--target",
+        setup::TARGET,
+    ];
+    cargo(&[&firmware[..], &["--", "-D", "warnings"]].concat())?;
+    cargo(&[
+        "clippy",
+        "--release",
+        "-p",
+        "qemu-pace",
+        "--",
+        "-D",
+        "warnings",
+    ])
+}
+
+fn cargo(arguments: &[&str]) -> Result<()> {
+    setup::run(setup::cargo().args(arguments))
+}

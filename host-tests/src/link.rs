@@ -1,0 +1,60 @@
+//! The process image over Modbus TCP, seen from the PLC.
+//!
+//! Not here: single signals, coils, reconnecting. A PLC reads the whole feedback block and writes the whole
+//! command block, one request each, so that what belongs together travels together.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use anyhow::{Context, Result, anyhow};
+use model_core::image::{Commands, FEEDBACK_WORDS, Feedback};
+use tokio_modbus::client::sync::{self, Reader as _, Writer as _};
+
+/// An answer takes milliseconds; this long without one, the simulator is gone.
+const TIMEOUT: Duration = Duration::from_secs(2);
+
+/// A connection to a simulator.
+pub struct Link {
+    context: sync::Context,
+    address: SocketAddr,
+}
+
+impl Link {
+    /// Connects.
+    pub fn connect(address: SocketAddr) -> Result<Self> {
+        let mut context = sync::tcp::connect_with_timeout(address, Some(TIMEOUT))
+            .with_context(|| format!("no simulator listens at {address} (Modbus TCP)"))?;
+        context.set_timeout(TIMEOUT);
+        Ok(Self { context, address })
+    }
+
+    /// Reads the feedback block (function code 4).
+    pub fn read(&mut self) -> Result<Feedback> {
+        let words = self
+            .context
+            .read_input_registers(0, FEEDBACK_WORDS as u16)
+            .map_err(anyhow::Error::from)
+            .and_then(|answer| answer.map_err(|exception| anyhow!("exception: {exception}")))
+            .with_context(|| self.failed("read the feedback block"))?;
+        let words = words.try_into().map_err(|words: Vec<u16>| {
+            anyhow!(
+                "asked for {FEEDBACK_WORDS} feedback words, got {}",
+                words.len()
+            )
+        })?;
+        Ok(Feedback { words })
+    }
+
+    /// Writes the command block (function code 16).
+    pub fn write(&mut self, commands: &Commands) -> Result<()> {
+        self.context
+            .write_multiple_registers(0, &commands.words)
+            .map_err(anyhow::Error::from)
+            .and_then(|answer| answer.map_err(|exception| anyhow!("exception: {exception}")))
+            .with_context(|| self.failed("write the command block"))
+    }
+
+    fn failed(&self, what: &str) -> String {
+        format!("cannot {what} at {} (Modbus TCP)", self.address)
+    }
+}

@@ -1,0 +1,256 @@
+//! Finds what the simulator in QEMU needs, and installs and builds what is missing.
+//!
+//! Not here: installing Rust itself, or QEMU on a system without apt. There it says what to do.
+//!
+//! Every step that takes time says so on stderr before it begins; a step with nothing to do is silent.
+
+use std::env;
+use std::io::{self, BufRead, BufReader, IsTerminal};
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::interrupt;
+
+/// The emulator.
+pub const QEMU: &str = "qemu-system-arm";
+/// The microcontroller's target.
+pub const TARGET: &str = "thumbv7em-none-eabihf";
+
+/// What QEMU needs to run the simulator.
+#[derive(Clone, Debug)]
+pub struct Mps2 {
+    /// The emulator.
+    pub qemu: PathBuf,
+    /// The firmware, an ELF file.
+    pub firmware: PathBuf,
+    /// The plugin that holds its clock to real time.
+    pub plugin: PathBuf,
+}
+
+/// Everything for the board `mps2`, installed and built where it is missing.
+pub fn mps2() -> Result<Mps2> {
+    mps2_with(Warnings::Shown)
+}
+
+/// What becomes of the compiler's warnings about the firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Warnings {
+    /// They are shown.
+    Shown,
+    /// They are errors.
+    Denied,
+}
+
+/// As [`mps2`].
+pub fn mps2_with(warnings: Warnings) -> Result<Mps2> {
+    let qemu = qemu()?;
+    target()?;
+    let package = ["build", "--release", "-p"];
+    let firmware = [&package[..], &["board-mps2", "--target", TARGET]].concat();
+    build("the firmware", &firmware, warnings)?;
+    let plugin = [&package[..], &["qemu-pace"]].concat();
+    build("the QEMU plugin that keeps time", &plugin, warnings)?;
+    Ok(Mps2 {
+        qemu,
+        firmware: built(&[TARGET, "release", "board-mps2"])?,
+        plugin: built(&["release", "libqemu_pace.so"])?,
+    })
+}
+
+/// The emulator, installed with apt where it is missing.
+pub fn qemu() -> Result<PathBuf> {
+    if let Some(path) = on_path(QEMU) {
+        return Ok(path);
+    }
+    const INSTALL: [&str; 4] = ["install", "-y", "--no-install-recommends", QEMU];
+    ensure!(
+        on_path("apt-get").is_some(),
+        "{QEMU} is not installed, and there is no apt-get to install it with: install QEMU's system emulator for \
+         Arm (7.0 or later) with this system's package manager, then run this again"
+    );
+    let prefix: &[&str] = if is_root() {
+        &[]
+    } else if succeeds(Command::new("sudo").args(["-n", "true"])) {
+        &["sudo", "-n"]
+    } else {
+        bail!(
+            "{QEMU} is not installed, and this user may not install it: run `sudo apt-get update && sudo apt-get {}`, \
+             then run this again",
+            INSTALL.join(" ")
+        );
+    };
+    step("installing QEMU (apt-get)");
+    let apt_get = |arguments: &[&str]| {
+        let line = [
+            prefix,
+            &["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"],
+            arguments,
+        ]
+        .concat();
+        let mut command = Command::new(line[0]);
+        command.args(&line[1..]);
+        run(&mut command)
+    };
+    // a list that cannot be renewed may still do
+    if let Err(error) = apt_get(&["update"]) {
+        eprintln!("winder: {error:#}; trying to install all the same");
+    }
+    apt_get(&INSTALL)?;
+    on_path(QEMU)
+        .with_context(|| format!("apt-get has installed {QEMU}, but it is not on the PATH"))
+}
+
+/// The Rust target of the microcontroller, installed with rustup where it is missing.
+pub fn target() -> Result<()> {
+    if has_target() {
+        return Ok(());
+    }
+    step(&format!("installing the Rust target {TARGET} (rustup)"));
+    let added = run(Command::new("rustup").args(["target", "add", TARGET]));
+    interrupt::check()?;
+    added
+        .and_then(|()| {
+            ensure!(has_target(), "rustup has installed it for another toolchain than `rustc`'s");
+            Ok(())
+        })
+        .with_context(|| {
+            format!(
+                "the Rust target {TARGET} is missing: `rustup target add {TARGET}` brings it where there is rustup \
+                 and a network; elsewhere, name a toolchain that has it in the environment variable \
+                 RUSTUP_TOOLCHAIN; then run this again"
+            )
+        })?;
+    Ok(())
+}
+
+fn has_target() -> bool {
+    let output = Command::new("rustc")
+        .args(["--print", "target-libdir", "--target", TARGET])
+        .current_dir(root())
+        .stderr(Stdio::null())
+        .output();
+    // rustc names the directory whether or not it is there
+    output.is_ok_and(|o| Path::new(String::from_utf8_lossy(&o.stdout).trim()).is_dir())
+}
+
+/// Runs cargo; shows what it says, but is silent when all was there.
+pub fn build(what: &str, arguments: &[&str], warnings: Warnings) -> Result<()> {
+    let mut child = cargo();
+    child
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(io::stderr())
+        .stderr(Stdio::piped());
+    if io::stderr().is_terminal() && warnings == Warnings::Shown {
+        child.env("CARGO_TERM_COLOR", "always");
+    }
+    let mut child = child.spawn().context("cannot start cargo")?;
+    let messages = child.stderr.take().context("cargo has no stderr")?;
+    let (mut announced, mut warned) = (false, false);
+    for line in BufReader::new(messages).lines() {
+        let line = line.context("cannot read what cargo says")?;
+        if line.contains("Finished") || line.trim().is_empty() {
+            continue;
+        }
+        if !announced {
+            step(&format!("building {what}"));
+            announced = true;
+        }
+        warned |= line.starts_with("warning");
+        eprintln!("{line}");
+    }
+    let status = interrupt::wait(&mut child)?;
+    ensure!(
+        status.success(),
+        "cannot build {what} ({status}): see cargo's messages above"
+    );
+    ensure!(
+        !(warned && warnings == Warnings::Denied),
+        "{what} compiles with warnings: see cargo's messages above"
+    );
+    Ok(())
+}
+
+/// Runs a program to its end; what it says goes to stderr, since stdout is for what we say to programs.
+pub fn run(command: &mut Command) -> Result<()> {
+    command.stdin(Stdio::null()).stdout(io::stderr());
+    let line = format!("{command:?}").replace('"', "");
+    let mut child = command
+        .spawn()
+        .with_context(|| format!("cannot start `{line}`"))?;
+    let status = interrupt::wait(&mut child)?;
+    ensure!(
+        status.success(),
+        "`{line}` failed ({status}): see its messages above"
+    );
+    Ok(())
+}
+
+/// Cargo, in the workspace.
+pub fn cargo() -> Command {
+    let mut command = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root());
+    command
+}
+
+/// The minor version that a tool of the toolchain tells: 95 of `rustc 1.95.0 (…)` as of `clippy 0.1.95 (…)`.
+pub fn minor_version(program: &str, arguments: &[&str]) -> Result<u32> {
+    let output = Command::new(program)
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .with_context(|| format!("cannot start {program}"))?;
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    let version = told.split_whitespace().nth(1).unwrap_or_default();
+    let numbers: Vec<_> = version.split('.').collect();
+    let minor = match numbers[..] {
+        ["0", "1", minor] | ["1", minor, _] => minor.parse().ok(),
+        _ => None,
+    };
+    minor.with_context(|| {
+        format!(
+            "`{program} {}` told no version: {told:?}",
+            arguments.join(" ")
+        )
+    })
+}
+
+/// The workspace.
+fn root() -> &'static Path {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    package.parent().unwrap_or(package)
+}
+
+fn built(parts: &[&str]) -> Result<PathBuf> {
+    let target = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+    let path = root().join(target).join(parts.iter().collect::<PathBuf>());
+    ensure!(
+        path.is_file(),
+        "cargo has built, but there is no {}",
+        path.display()
+    );
+    Ok(path)
+}
+
+/// The path of a program.
+pub fn on_path(program: &str) -> Option<PathBuf> {
+    env::split_paths(&env::var_os("PATH")?)
+        .map(|dir| dir.join(program))
+        .find(|path| path.is_file())
+}
+
+fn is_root() -> bool {
+    // the owner of our own entry is our effective user
+    std::fs::metadata("/proc/self").is_ok_and(|own| own.uid() == 0)
+}
+
+fn succeeds(command: &mut Command) -> bool {
+    command.status().is_ok_and(|status| status.success())
+}
+
+fn step(what: &str) {
+    eprintln!("winder: {what} …");
+}

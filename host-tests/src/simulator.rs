@@ -1,0 +1,152 @@
+//! A simulator to command: on a microcontroller in QEMU, or natively in this process.
+//!
+//! Not here: a simulator on hardware. It is at an address of its own, and nobody has to start it.
+
+use std::net::SocketAddr;
+use std::ops::RangeInclusive;
+
+use anyhow::{Context, Result, ensure};
+use board_host::STEP;
+use firmware::journal::Journal;
+use model_core::logic::{Fault, Mode, Refusal};
+
+use crate::log::{Level, Line, Log};
+use crate::qemu::Qemu;
+use crate::setup;
+
+/// What the simulator runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Board {
+    /// Arm Cortex-M7 microcontroller (mps2-an500) in QEMU
+    Mps2,
+    /// This PC, without QEMU
+    Host,
+}
+
+impl Board {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Board::Mps2 => "Cortex-M7 in QEMU",
+            Board::Host => "this PC",
+        }
+    }
+}
+
+/// Simulated time over real time: from slow motion to faster than any PC.
+const PACES: RangeInclusive<f64> = 0.01..=1000.0;
+
+/// How to run a simulator.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Port of 127.0.0.1 for Modbus TCP; 0 takes any free one.
+    pub port: u16,
+    /// Simulated time over real time.
+    pub pace: f64,
+    /// Where its log goes.
+    pub log: Log,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            port: 0,
+            pace: 1.0,
+            log: Log::default(),
+        }
+    }
+}
+
+impl Options {
+    /// Refuses a pace that no clock can keep.
+    fn check(&self) -> Result<()> {
+        ensure!(
+            PACES.contains(&self.pace),
+            "pace {} is outside {} to {}: 1 is real time, 10 ten times faster",
+            self.pace,
+            PACES.start(),
+            PACES.end()
+        );
+        Ok(())
+    }
+}
+
+/// A running simulator; it ends when dropped.
+pub enum Simulator {
+    /// In QEMU.
+    Mps2(Qemu),
+    /// In this process.
+    Host(board_host::Board),
+}
+
+impl Simulator {
+    /// Installs and builds what is missing, starts the simulator, and waits until it answers.
+    pub fn start(board: Board, options: Options) -> Result<Self> {
+        options.check()?;
+        match board {
+            Board::Mps2 => Ok(Self::Mps2(Qemu::start(&setup::mps2()?, options)?)),
+            Board::Host => Ok(Self::Host(host(options)?)),
+        }
+    }
+
+    /// Where it answers Modbus TCP.
+    pub fn address(&self) -> SocketAddr {
+        match self {
+            Self::Mps2(qemu) => qemu.address(),
+            Self::Host(board) => board.address,
+        }
+    }
+
+    /// An error that says why, once it has ended by itself.
+    pub fn check(&mut self) -> Result<()> {
+        match self {
+            Self::Mps2(qemu) => qemu.check(),
+            Self::Host(_) => Ok(()),
+        }
+    }
+}
+
+fn host(options: Options) -> Result<board_host::Board> {
+    let Options { port, pace, log } = options;
+    let options = board_host::Options {
+        port,
+        pace,
+        ..board_host::Options::default()
+    };
+    board_host::Board::start(options, board_host::simulator(HostJournal(log)))
+        .with_context(|| format!("cannot start the simulator at port {port} of 127.0.0.1"))
+}
+
+/// The native board's journal, in the words of the firmware's log.
+struct HostJournal(Log);
+
+impl HostJournal {
+    fn push(&mut self, level: Level, cycle: u32, text: String) {
+        let time = Some(format!("{:.6}", f64::from(cycle) * STEP.as_secs_f64()));
+        self.0.push(Line { level, time, text });
+    }
+}
+
+impl Journal for HostJournal {
+    fn command(&mut self, cycle: u32, word: u16, value: u16) {
+        self.push(
+            Level::Debug,
+            cycle,
+            format!("command {cycle} {word} {value}"),
+        );
+    }
+
+    fn state(&mut self, cycle: u32, mode: Mode, fault: Fault, refusal: Refusal) {
+        let mut text = mode.name().to_owned();
+        let mut level = Level::Info;
+        if refusal != Refusal::None {
+            level = Level::Warn;
+            text += &format!("; refused: {}", refusal.name());
+        }
+        if fault != Fault::None {
+            level = Level::Error;
+            text += &format!("; fault: {}", fault.name());
+        }
+        self.push(level, cycle, text);
+    }
+}

@@ -1,0 +1,89 @@
+//! The PLC's program against the simulator's own parts, in lockstep: no network, no clock.
+
+use host_tests::plc::{CYCLE_S, Plc, Recipe, Sample, Step, Trouble};
+use host_tests::report::Report;
+use model_core::drive::DRIVE_PERIOD_MS;
+use model_core::image::{self, Commands, Feedback, Image};
+use model_core::machine::Machine;
+use model_core::simulator::Simulator;
+
+/// Winds a set on a NEWS-8000; what the PLC saw, or what it complained about.
+fn wind(recipe: &Recipe) -> Result<Vec<Sample>, Trouble> {
+    let machine = Machine::news_8000();
+    let mut simulator = Simulator::<f32, 3>::new(&machine).expect("a valid machine");
+    let mut image = Image {
+        commands: Commands::of(&machine),
+        feedback: Feedback::default(),
+    };
+    let mut plc = Plc::new(recipe.clone());
+    let mut samples = Vec::new();
+    while plc.step() != Step::Done {
+        for _ in 0..(1e3 * CYCLE_S) as u32 / DRIVE_PERIOD_MS {
+            simulator.drive_cycle(&mut image);
+        }
+        samples.push(plc.cycle(&image.feedback)?);
+        image.commands = *plc.commands();
+    }
+    Ok(samples)
+}
+
+fn recipe(diameter_m: f64, speed_m_min: f64) -> Recipe {
+    Recipe {
+        machine: Machine::news_8000(),
+        diameter_m,
+        speed_m_s: speed_m_min / 60.0,
+    }
+}
+
+#[test]
+fn any_set_is_wound_within_its_limits() {
+    // the default set; one too small to reach its speed; a slow one; the whole one
+    for (diameter_m, speed_m_min) in [(0.40, 1200.0), (0.15, 2200.0), (0.13, 60.0), (1.25, 2200.0)]
+    {
+        let recipe = recipe(diameter_m, speed_m_min);
+        let samples = wind(&recipe).unwrap_or_else(|trouble| panic!("{diameter_m} m: {trouble}"));
+        let report = Report::of(&recipe, &samples);
+        assert!(report.missed().is_empty(), "{diameter_m} m:\n{report}");
+        let last = samples.last().unwrap();
+        assert!(
+            last.t_s < 30.0 + 1.2 * recipe.duration_s(),
+            "{} s",
+            last.t_s
+        );
+        let length = last.value(&image::LENGTH_WU);
+        assert!(
+            (length / recipe.set_length_m() - 1.0).abs() < 0.02,
+            "{length} m"
+        );
+    }
+}
+
+#[test]
+fn a_refusal_ends_the_set_and_names_step_reason_and_state() {
+    let mut recipe = recipe(0.40, 1200.0);
+    recipe.machine.parent_roll.full_radius_m = 1.6;
+    let trouble = wind(&recipe).unwrap_err().to_string();
+    for part in [
+        "reason 7: the diameter preset is not between spool and full roll",
+        "step \"diameter preset\"",
+        "mode 0: drives off",
+        "d_uw 3000.0 mm",
+    ] {
+        assert!(trouble.contains(part), "{trouble:?} lacks {part:?}");
+    }
+}
+
+#[test]
+fn a_machine_that_does_not_answer_ends_the_set_at_the_step_s_time_limit() {
+    let mut plc = Plc::new(recipe(0.40, 1200.0));
+    let mut feedback = Feedback::default();
+    let trouble = (0..)
+        .find_map(|tick| {
+            feedback.set_double(&image::PLANT_TICKS, (u32::MAX - 100).wrapping_add(tick));
+            plc.cycle(&feedback).err()
+        })
+        .unwrap()
+        .to_string();
+    assert!(trouble.contains("not done within 5 s"), "{trouble}");
+    assert!(trouble.contains("step \"new rolls\""), "{trouble}");
+}
