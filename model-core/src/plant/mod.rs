@@ -172,6 +172,14 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         self.state.map(|sum| sum.value())
     }
 
+    /// Puts the machine into a state; the web stays threaded or not.
+    pub fn set_state(&mut self, state: &State<R, SPANS>) {
+        self.state = state.map(R::Sum::at);
+        if self.threaded {
+            self.web = self.coefficients.web(state);
+        }
+    }
+
     /// Tensions of the spans, N: ground truth.
     pub fn tension(&self) -> [R; SPANS] {
         self.web.tension
@@ -239,7 +247,7 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
             return BrakeFriction::NONE;
         }
         let of = |closed, brake| if closed { brake } else { R::ZERO };
-        let bodies = c.bodies(x, &self.web, load);
+        let bodies = c.bodies(x, &self.web, self.threaded, load);
         let (inertia, torque) = bodies.uw;
         let (mass, force) = bodies.wu;
         BrakeFriction {
@@ -302,10 +310,21 @@ impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
     }
 
     #[inline(always)]
-    fn bodies(&self, x: &State<R, SPANS>, web: &Web<R, SPANS>, load: &Load<R>) -> Bodies<R> {
+    fn bodies(
+        &self,
+        x: &State<R, SPANS>,
+        web: &Web<R, SPANS>,
+        threaded: bool,
+        load: &Load<R>,
+    ) -> Bodies<R> {
         let (v, t) = (x.v[SPANS - 1], web.tension[SPANS - 1]);
         let roll = self.windup.shipping_roll(x.r_wu);
-        let r_wu_rate = self.windup.radius_rate(&roll, v);
+        // without web the roll neither grows nor is pushed by the paper that arrives
+        let r_wu_rate = if threaded {
+            self.windup.radius_rate(&roll, v)
+        } else {
+            R::ZERO
+        };
         let torque = self
             .unwind
             .torque(load.uw, web.tension[0], x.omega_uw * x.r_uw, x.r_uw);
@@ -327,8 +346,7 @@ impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
         threaded: bool,
         load: &Load<R>,
     ) -> State<R, SPANS> {
-        let bodies = self.bodies(x, web, load);
-        let radius = |rate| if threaded { rate } else { R::ZERO };
+        let bodies = self.bodies(x, web, threaded, load);
         State {
             strain: web.strain_rate,
             v: core::array::from_fn(|i| match &self.idle[i] {
@@ -336,8 +354,12 @@ impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
                 None => bodies.wu.1 / bodies.wu.0,
             }),
             omega_uw: bodies.uw.1 / bodies.uw.0,
-            r_uw: radius(self.unwind.radius_rate(x.omega_uw)),
-            r_wu: radius(bodies.r_wu_rate),
+            r_uw: if threaded {
+                self.unwind.radius_rate(x.omega_uw)
+            } else {
+                R::ZERO
+            },
+            r_wu: bodies.r_wu_rate,
             travel: x.v[SPANS - 1],
         }
     }

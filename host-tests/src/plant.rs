@@ -1,0 +1,445 @@
+//! The plant alone, driven open loop by a schedule of torques.
+//!
+//! Not here: regulators, logic, sensors, limits of the motors. A row of the schedule acts on the rolls as it
+//! stands, so that the winder can be compared with other models of it.
+//!
+//! A schedule is CSV with a header, its columns in any order: `t_s`, the torques `T_uw`, `T_rd`, `T_fd`, `T_rr`
+//! in N·m, and if wanted the brakes `brake_uw`, `brake_rd`, `brake_fd`, 0 or 1. The first row is at 0. A row holds
+//! from the first step of 4 ms at or after its time until the next row does; the last row only says when the run
+//! ends. Time is counted in whole steps.
+//!
+//! The run starts at standstill: all spans at stall tension, full parent roll, bare core, brakes off.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use model_core::exchange::{Actuators, Brakes, BySection};
+use model_core::machine::{Machine, PRESETS};
+use model_core::plant::{PLANT_PERIOD_MS, Winder};
+use model_core::real::Real;
+
+/// Spans of the lumped machine, whose rolls the columns of the output name.
+const SPANS: usize = 3;
+/// Step of the plant, ns.
+const STEP_NS: u64 = 1_000_000 * PLANT_PERIOD_MS as u64;
+/// Longest schedule, s: eleven days.
+const LONGEST_S: f64 = 1e6;
+/// Largest torque, N·m: the largest motor that a machine's description may have.
+const LARGEST_N_M: f64 = 1e6;
+
+/// Columns that a schedule must have, …
+const NEEDED: [&str; 5] = ["t_s", "T_uw", "T_rd", "T_fd", "T_rr"];
+/// … and those it may have.
+const OPTIONAL: [&str; 3] = ["brake_uw", "brake_rd", "brake_fd"];
+
+/// What to run, and where the result goes.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Options {
+    /// Torques over time: CSV with the columns t_s,T_uw,T_rd,T_fd,T_rr (s, N·m) and, if wanted,
+    /// brake_uw,brake_rd,brake_fd (0 or 1). Each row holds until the next; the last one ends the run
+    #[arg(long, value_name = "FILE.csv")]
+    pub schedule: PathBuf,
+    /// Speeds, tensions and radii over time, as CSV in SI units; `-` prints them
+    #[arg(long, value_name = "FILE.csv")]
+    pub out: PathBuf,
+    /// Machine by the name of its preset
+    #[arg(long, value_name = "NAME", default_value = PRESETS[0].0)]
+    pub machine: String,
+    /// Numbers to compute with; the microcontroller has f32
+    #[arg(long, value_enum, default_value_t = Scalar::F64)]
+    pub scalar: Scalar,
+    /// Time from row to row of the output, a multiple of 0.004 s
+    #[arg(
+        long = "every",
+        value_name = "SECONDS",
+        default_value_t = 1.0,
+        allow_negative_numbers = true
+    )]
+    pub every_s: f64,
+}
+
+/// Numbers to compute with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Scalar {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+/// Reads the schedule, runs the plant, writes the result.
+///
+/// `console` gets a line about what was done, or the result itself when the output file is `-`. Nothing is
+/// written before machine, schedule and options have been found good.
+pub fn run(options: &Options, console: &mut dyn Write) -> Result<()> {
+    let machine = preset(&options.machine)?;
+    let every = output_period(options.every_s)?;
+    let schedule = Schedule::open(&options.schedule)?;
+    let simulate = match options.scalar {
+        Scalar::F32 => simulate::<f32>,
+        Scalar::F64 => simulate::<f64>,
+    };
+    if options.out.as_os_str() == "-" {
+        simulate(&machine, &schedule, every, console)?;
+        return Ok(());
+    }
+    let path = options.out.display();
+    let file = File::create(&options.out).with_context(|| format!("cannot write {path}"))?;
+    let mut file = BufWriter::new(file);
+    let rows = simulate(&machine, &schedule, every, &mut file)
+        .and_then(|rows| Ok(file.flush().map(|()| rows)?))
+        .with_context(|| format!("cannot write {path}"))?;
+    writeln!(console, "{path}: {rows} rows")?;
+    Ok(())
+}
+
+fn preset(name: &str) -> Result<Machine> {
+    Machine::preset(name).ok_or_else(|| {
+        let names: Vec<_> = PRESETS.iter().map(|(name, _)| *name).collect();
+        anyhow!(
+            "no machine is named {name:?}; there are {}",
+            names.join(", ")
+        )
+    })
+}
+
+/// Steps from row to row of the output.
+fn output_period(every_s: f64) -> Result<u64> {
+    let steps = nanoseconds(every_s) / STEP_NS;
+    ensure!(
+        every_s <= LONGEST_S && steps > 0 && nanoseconds(every_s).is_multiple_of(STEP_NS),
+        "--every {every_s} is not a multiple of the plant's step, 0.004 s, from 0.004 to {LONGEST_S:.0} s"
+    );
+    Ok(steps)
+}
+
+/// A time to the nearest nanosecond, so that no multiple of the step is missed by rounding. What is negative or
+/// not a number gives 0.
+fn nanoseconds(seconds: f64) -> u64 {
+    (seconds * 1e9).round() as u64
+}
+
+/// Torques and brakes over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    rows: Vec<Row>,
+}
+
+/// What holds from a step on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Row {
+    tick: u64,
+    torque: BySection<f64>,
+    brakes: Brakes<bool>,
+}
+
+impl Schedule {
+    /// Reads a file.
+    pub fn open(path: &Path) -> Result<Self> {
+        let name = path.display().to_string();
+        let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
+        Self::read(&name, BufReader::new(file))
+    }
+
+    /// Reads CSV from anywhere; an error gives the source's `name`, the line and the reason.
+    ///
+    /// Numbers need no CSV library: what one would add here, escapes in quotes, a schedule has no use for, and
+    /// the line of an error must be right after empty lines, too.
+    pub fn read(name: &str, source: impl BufRead) -> Result<Self> {
+        let (mut line, mut columns, mut time) = (0, None, None);
+        let mut rows = Vec::new();
+        for (number, text) in (1..).zip(source.lines()) {
+            let at = || format!("{name}:{number}");
+            let text = text.with_context(at)?;
+            let fields = fields(&text);
+            if fields == [""] {
+                continue;
+            }
+            line = number;
+            let Some(columns) = &columns else {
+                columns = Some(Columns::of(&fields).with_context(at)?);
+                continue;
+            };
+            let (t_s, row) = columns.row(&fields).with_context(at)?;
+            follows(time, t_s).with_context(at)?;
+            time = Some(t_s);
+            rows.push(row);
+        }
+        ensure!(!rows.is_empty(), "{name}:{}: there is no row", line + 1);
+        Ok(Self { rows })
+    }
+
+    /// The step at which the run ends.
+    fn end(&self) -> u64 {
+        self.rows.last().map_or(0, |row| row.tick)
+    }
+
+    /// What holds at each step, from the first.
+    fn steps(&self) -> impl Iterator<Item = &Row> {
+        self.rows.windows(2).flat_map(|pair| {
+            let steps = pair[1].tick - pair[0].tick;
+            (0..steps).map(|_| &pair[0])
+        })
+    }
+}
+
+/// The fields of a line, without blanks, quotes and the mark that some programs put before the first.
+fn fields(line: &str) -> Vec<&str> {
+    line.trim_start_matches('\u{feff}')
+        .split(',')
+        .map(|field| field.trim().trim_matches('"'))
+        .collect()
+}
+
+/// Refuses a time that does not follow the one before.
+fn follows(before_s: Option<f64>, t_s: f64) -> Result<()> {
+    match before_s {
+        None => ensure!(t_s == 0.0, "t_s = {t_s}: the first row must be at 0"),
+        Some(before_s) => ensure!(t_s > before_s, "t_s = {t_s} does not come after {before_s}"),
+    }
+    Ok(())
+}
+
+/// Where in a record the columns stand, in the order of [`NEEDED`] and [`OPTIONAL`].
+struct Columns {
+    needed: [usize; NEEDED.len()],
+    optional: [Option<usize>; OPTIONAL.len()],
+    width: usize,
+}
+
+impl Columns {
+    fn of(header: &[&str]) -> Result<Self> {
+        let known = || NEEDED.iter().chain(&OPTIONAL);
+        let find = |name: &str| header.iter().position(|column| *column == name);
+        for (i, column) in header.iter().enumerate() {
+            ensure!(
+                known().any(|name| name == column),
+                "unknown column {column:?}; a schedule has {} and may have {}",
+                NEEDED.join(","),
+                OPTIONAL.join(",")
+            );
+            ensure!(find(column) == Some(i), "column {column} stands twice");
+        }
+        let mut needed = [0; NEEDED.len()];
+        for (place, name) in needed.iter_mut().zip(NEEDED) {
+            *place = find(name).ok_or_else(|| anyhow!("column {name} is missing"))?;
+        }
+        Ok(Self {
+            needed,
+            optional: OPTIONAL.map(find),
+            width: header.len(),
+        })
+    }
+
+    /// A row with its time as it was written, s.
+    fn row(&self, record: &[&str]) -> Result<(f64, Row)> {
+        ensure!(
+            record.len() == self.width,
+            "{} fields, but the header has {}",
+            record.len(),
+            self.width
+        );
+        let number =
+            |column: usize, limit| number(NEEDED[column], record[self.needed[column]], limit);
+        let brake = |brake: usize| match self.optional[brake] {
+            None => Ok(false),
+            Some(place) => switch(OPTIONAL[brake], record[place]),
+        };
+        let t_s = number(0, LONGEST_S)?;
+        let row = Row {
+            tick: nanoseconds(t_s).div_ceil(STEP_NS),
+            torque: BySection {
+                uw: number(1, LARGEST_N_M)?,
+                rd: number(2, LARGEST_N_M)?,
+                fd: number(3, LARGEST_N_M)?,
+                rr: number(4, LARGEST_N_M)?,
+            },
+            brakes: Brakes {
+                uw: brake(0)?,
+                rd: brake(1)?,
+                fd: brake(2)?,
+            },
+        };
+        Ok((t_s, row))
+    }
+}
+
+/// A number in ±`limit`.
+fn number(column: &str, field: &str, limit: f64) -> Result<f64> {
+    let value: f64 = field
+        .parse()
+        .map_err(|_| anyhow!("{column} = {field:?} is not a number"))?;
+    ensure!(
+        value.abs() <= limit,
+        "{column} = {field} is outside ±{limit}"
+    );
+    Ok(value)
+}
+
+/// 0 or 1.
+fn switch(column: &str, field: &str) -> Result<bool> {
+    match field {
+        "0" => Ok(false),
+        "1" => Ok(true),
+        _ => bail!("{column} = {field:?} is neither 0 nor 1"),
+    }
+}
+
+/// Runs the plant and writes a row at the start and every `every` steps; gives the number of rows.
+fn simulate<R: Real>(
+    machine: &Machine,
+    schedule: &Schedule,
+    every: u64,
+    out: &mut dyn Write,
+) -> Result<u64> {
+    let mut winder = Winder::<R, SPANS>::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS))?;
+    winder.thread_at(R::of(stall_tension(machine)));
+    writeln!(out, "t_s,v_uw,v_gr,v_sr,v_rd,t_uw,t_gr,t_sr,r_uw,r_wu")?;
+    write_row(out, 0, &winder)?;
+    for (step, row) in (1_u64..).zip(schedule.steps()) {
+        winder.step(&Actuators {
+            torque: row.torque.map(R::of),
+            brakes: row.brakes,
+            ..Actuators::default()
+        });
+        if step.is_multiple_of(every) {
+            write_row(out, step, &winder)?;
+        }
+    }
+    Ok(schedule.end() / every + 1)
+}
+
+/// Tension at standstill, N.
+fn stall_tension(machine: &Machine) -> f64 {
+    machine.operation.stall_share * machine.operation.tension_n_m * machine.web.width_m
+}
+
+/// One row of the output. `Debug` gives the shortest digits that read back as the same number.
+fn write_row<R: Real>(out: &mut dyn Write, step: u64, winder: &Winder<R, SPANS>) -> io::Result<()> {
+    let (x, t) = (winder.state(), winder.tension());
+    let v_uw = x.omega_uw * x.r_uw;
+    let seconds = (step * u64::from(PLANT_PERIOD_MS)) as f64 / 1e3;
+    write!(out, "{seconds:?},{v_uw:?}")?;
+    for value in x.v.into_iter().chain(t).chain([x.r_uw, x.r_wu]) {
+        write!(out, ",{value:?}")?;
+    }
+    writeln!(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "t_s,T_uw,T_rd,T_fd,T_rr";
+
+    fn read(text: &str) -> Result<Schedule> {
+        Schedule::read("s.csv", text.as_bytes())
+    }
+
+    #[test]
+    fn bad_schedules_are_refused_with_file_line_and_reason() {
+        for (text, reason) in [
+            ("", "s.csv:1: there is no row"),
+            ("{}\n", "s.csv:2: there is no row"),
+            (
+                "t_s,T_uw,T_rd,T_fd\n0,0,0,0",
+                "s.csv:1: column T_rr is missing",
+            ),
+            ("{},T_xx\n", "s.csv:1: unknown column \"T_xx\""),
+            ("{},T_uw\n", "s.csv:1: column T_uw stands twice"),
+            ("0,0,0,0,0\n", "s.csv:1: unknown column \"0\""),
+            (
+                "{}\n0.1,0,0,0,0",
+                "s.csv:2: t_s = 0.1: the first row must be at 0",
+            ),
+            (
+                "{}\n-1,0,0,0,0",
+                "s.csv:2: t_s = -1: the first row must be at 0",
+            ),
+            (
+                "{}\n0,0,0,0,0\n2,0,0,0,0\n\n1,0,0,0,0",
+                "s.csv:5: t_s = 1 does not come after 2",
+            ),
+            (
+                "{}\n0,0,0,0,0\n0,1,0,0,0",
+                "s.csv:3: t_s = 0 does not come after 0",
+            ),
+            ("{}\n0,x,0,0,0", "s.csv:2: T_uw = \"x\" is not a number"),
+            ("{}\n0,,0,0,0", "s.csv:2: T_uw = \"\" is not a number"),
+            ("{}\n0,0,NaN,0,0", "s.csv:2: T_rd = NaN is outside ±1000000"),
+            (
+                "{}\n0,0,0,-inf,0",
+                "s.csv:2: T_fd = -inf is outside ±1000000",
+            ),
+            (
+                "{}\n0,0,0,0,1e39",
+                "s.csv:2: T_rr = 1e39 is outside ±1000000",
+            ),
+            (
+                "{}\n0,0,0,0,0\n1e9,0,0,0,0",
+                "s.csv:3: t_s = 1e9 is outside ±1000000",
+            ),
+            ("{}\n0,0,0,0\n", "s.csv:2: 4 fields, but the header has 5"),
+            (
+                "{}\n0,0,0,0,0,\n",
+                "s.csv:2: 6 fields, but the header has 5",
+            ),
+            (
+                "{},brake_rd\n0,0,0,0,0,on",
+                "s.csv:2: brake_rd = \"on\" is neither 0 nor 1",
+            ),
+            (
+                "{}\n0,0,0,0,\u{0}",
+                "s.csv:2: T_rr = \"\\0\" is not a number",
+            ),
+        ] {
+            let text = text.replace("{}", HEADER);
+            let error = format!("{:#}", read(&text).expect_err(&text));
+            assert!(error.starts_with(reason), "{text:?}: {error}");
+        }
+        let error = Schedule::read("s.csv", &b"t_s\xff"[..]).unwrap_err();
+        assert!(format!("{error:#}").starts_with("s.csv:1: "), "{error:#}");
+    }
+
+    #[test]
+    fn columns_stand_in_any_order_with_spaces_quotes_and_empty_lines() {
+        let plain = read(&format!("{HEADER},brake_fd\n0,1,2,3,4,0\n0.5,-1,0,0,0,1")).unwrap();
+        let other = "\u{feff}T_fd, brake_fd, T_rd,\"T_rr\", T_uw, t_s\r\n\r\n3,0,2,4,1e0,0\r\n0,1,0,0,-1,.5\r\n";
+        assert_eq!(read(other).unwrap(), plain);
+    }
+
+    /// A time between two steps counts for the later one.
+    #[test]
+    fn a_row_holds_from_the_first_step_at_or_after_its_time() {
+        for (t_s, step) in [
+            ("0.004", 1),
+            ("0.012", 3),
+            ("0.005", 2),
+            ("0.3", 75),
+            ("4.1", 1025),
+            ("1e5", 25_000_000),
+        ] {
+            let schedule = read(&format!("{HEADER}\n0,0,0,0,0\n{t_s},0,0,0,0")).unwrap();
+            assert_eq!(schedule.end(), step, "{t_s}");
+        }
+    }
+
+    #[test]
+    fn the_output_period_is_a_multiple_of_the_step() {
+        for (every_s, steps) in [(0.004, 1), (0.1, 25), (1.0, 250), (0.012, 3), (0.7, 175)] {
+            assert_eq!(output_period(every_s).unwrap(), steps, "{every_s}");
+        }
+        for every_s in [0.0, -1.0, 0.001, 0.01, 1e-300, f64::NAN, f64::INFINITY, 1e7] {
+            let error = output_period(every_s).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("--every {every_s} ")), "{error}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_machine_is_answered_with_the_names_of_the_presets() {
+        let error = preset("WIND-9").unwrap_err().to_string();
+        assert_eq!(error, "no machine is named \"WIND-9\"; there are NEWS-8000");
+    }
+}

@@ -1,0 +1,155 @@
+//! Brakes: they stop in the time that Coulomb friction takes, hold without creep, and act after their delay.
+
+use model_core::exchange::{Actuators, Brakes, BySection};
+use model_core::machine::Machine;
+use model_core::real::Real;
+
+use crate::form::{self, Bench, H};
+use crate::{in_both_scalars, near};
+
+in_both_scalars!(
+    a_brake_stops_in_momentum_over_force,
+    a_brake_holds_the_web_at_standstill_without_creep,
+    a_brake_that_is_too_weak_slips_by_the_difference,
+    a_brake_acts_after_its_delay,
+);
+
+fn frictionless() -> Machine {
+    let mut m = Machine::news_8000();
+    m.parent_roll.friction_n_s_m = 0.0;
+    m.shipping_roll.friction_n_s_m = 0.0;
+    for roll in [&mut m.rear_drum, &mut m.front_drum, &mut m.rider_roll] {
+        roll.friction_n_s_m = 0.0;
+    }
+    m
+}
+
+fn braked<R: Real>() -> Actuators<R> {
+    Actuators {
+        brakes: Brakes::all(true),
+        ..Actuators::default()
+    }
+}
+
+/// Steps until the speed is exactly zero; it must stay so.
+fn time_to_stop<R: Real>(bench: &mut Bench<R>, speed: impl Fn(&Bench<R>) -> R) -> f64 {
+    let mut steps = 0;
+    while speed(bench) != R::ZERO {
+        assert!(speed(bench) > R::ZERO, "it turns back");
+        bench.winder.step(&braked());
+        steps += 1;
+    }
+    for _ in 0..1000 {
+        bench.winder.step(&braked());
+        assert_eq!(speed(bench), R::ZERO);
+    }
+    f64::from(steps) * H
+}
+
+/// T = V_0·M/F_b and ω_0·J/T_b, ± h, after the delay. No web, no other friction.
+fn a_brake_stops_in_momentum_over_force<R: Real>() {
+    let m = frictionless();
+    let (b, delay) = (&m.brakes, m.brakes.delay_s);
+    let force = b.rd_n_m / m.rear_drum.radius_m + b.fd_n_m / m.front_drum.radius_m;
+    for (v, r) in [(10.0, 0.05), (36.0, 0.6), (0.01, 0.3)] {
+        let mut bench = Bench::<R>::new(m.clone());
+        let mut x = bench.x();
+        (x.v[2], x.r_wu) = (v, r);
+        bench.set(&x);
+        let time = time_to_stop(&mut bench, |bench| bench.winder.state().v[2]);
+        let expected = v * form::windup_mass(&m, r) / force;
+        near("windup", time, delay + expected, 1.01 * H);
+
+        let omega = v / 1.5;
+        let mut x = bench.x();
+        (x.omega_uw, x.r_uw) = (omega, 1.5);
+        bench.set(&x);
+        let time = time_to_stop(&mut bench, |bench| bench.winder.state().omega_uw);
+        // the brakes are closed already
+        let expected = omega * form::parent_inertia(&m, 1.5) / b.uw_n_m;
+        near("unwind", time, expected, 1.01 * H);
+    }
+}
+
+/// The web under stall tension between two held rolls, the motors pulling against the brakes.
+fn a_brake_holds_the_web_at_standstill_without_creep<R: Real>() {
+    let m = Machine::news_8000();
+    let stall = m.operation.stall_share * form::tension(&m);
+    let mut bench = Bench::<R>::new(m);
+    bench.winder.thread_at(R::of(stall));
+    // until the brakes are closed, the web pulls the rolls together by a hair
+    for _ in 0..25 {
+        bench.winder.step(&braked());
+    }
+    // less than 6 and 10 kN·m of brakes less 840 N of web
+    let motors = BySection {
+        uw: 4e3,
+        rd: 3e3,
+        fd: 3e3,
+        rr: 50.0,
+    };
+    let pulled = Actuators {
+        torque: motors.map(R::of),
+        ..braked()
+    };
+    let mut tension = bench.t();
+    for minute in 0..3 {
+        for _ in 0..(60.0 / H) as u32 {
+            bench.winder.step(&pulled);
+            let x = bench.winder.state();
+            assert_eq!((x.v[2], x.omega_uw), (R::ZERO, R::ZERO));
+        }
+        for (t, before) in bench.t().into_iter().zip(tension) {
+            // in the first minute the idle rolls come to rest
+            let drift = if minute == 0 { 10.0 } else { 1e-3 };
+            near("tension after a minute", t, before, drift);
+        }
+        tension = bench.t();
+    }
+    assert!(tension.iter().all(|t| *t > 0.9 * stall), "{tension:?}");
+}
+
+/// With F above F_b the body accelerates by (F − F_b)/M.
+fn a_brake_that_is_too_weak_slips_by_the_difference<R: Real>() {
+    let m = frictionless();
+    let mut bench = Bench::<R>::new(m.clone());
+    let mut actuators = braked::<R>();
+    for _ in 0..20 {
+        bench.winder.step(&actuators);
+    }
+    let torque = m.brakes.rd_n_m + m.brakes.fd_n_m + 1000.0;
+    actuators.torque.rd = R::of(torque);
+    actuators.torque.uw = R::of(m.brakes.uw_n_m + 500.0);
+    for _ in 0..250 {
+        bench.winder.step(&actuators);
+    }
+    let (x, m) = (bench.x(), &bench.machine);
+    let v = 1000.0 / m.rear_drum.radius_m / form::windup_mass(m, 0.05);
+    let omega = 500.0 / form::parent_inertia(m, 1.5);
+    near("V after 1 s", x.v[2], v, 1e-4 * v);
+    near("ω after 1 s", x.omega_uw, omega, 1e-4 * omega);
+}
+
+/// 40 ms are 10 steps without effect, both ways.
+fn a_brake_acts_after_its_delay<R: Real>() {
+    let mut bench = Bench::<R>::new(frictionless());
+    let mut x = bench.x();
+    (x.v[2], x.omega_uw) = (10.0, 10.0);
+    bench.set(&x);
+    let mut act = |on, braking: bool| {
+        let actuators = Actuators {
+            brakes: Brakes::all(on),
+            ..Actuators::default()
+        };
+        let before = bench.winder.state();
+        let m = bench.winder.step(&actuators);
+        let after = bench.winder.state();
+        assert_eq!(m.brakes, Brakes::all(braking));
+        assert_eq!(after.v[2] < before.v[2], braking);
+        assert_eq!(after.omega_uw < before.omega_uw, braking);
+    };
+    (0..10).for_each(|_| act(true, false));
+    (0..10).for_each(|_| act(true, true));
+    (0..10).for_each(|_| act(false, true));
+    (0..10).for_each(|_| act(false, false));
+}

@@ -1,0 +1,233 @@
+//! The winder in closed form, `f64`, from the machine's description: what the core is held against.
+//!
+//! Not here: anything taken from the core but the description itself, and the [`Bench`] to run it on.
+
+use std::f64::consts::{PI, TAU};
+
+use model_core::exchange::{Actuators, BySection};
+use model_core::machine::{DrivenRoll, Machine};
+use model_core::plant::Winder;
+use model_core::plant::rk4::State;
+use model_core::real::Real;
+
+/// The plant's step, s.
+pub const H: f64 = 0.004;
+/// Run speed 2 200 m/min, m/s.
+pub const RUN: f64 = 2200.0 / 60.0;
+
+/// EA, N
+pub fn stiffness(m: &Machine) -> f64 {
+    m.web.stiffness_n_m * m.web.width_m
+}
+
+/// t* = full tension, N
+pub fn tension(m: &Machine) -> f64 {
+    m.operation.tension_n_m * m.web.width_m
+}
+
+/// Lengths of the spans, m
+pub fn lengths(m: &Machine) -> [f64; 3] {
+    [m.idle[0].span_m, m.idle[1].span_m, m.last_span_m]
+}
+
+/// ½·π·ρ·W·(R⁴ − r⁴), kg·m²
+fn paper(m: &Machine, outer: f64, inner: f64) -> f64 {
+    let density = m.web.grammage_kg_m2 / m.web.caliper_m;
+    0.5 * PI * density * m.web.width_m * (outer.powi(4) - inner.powi(4))
+}
+
+/// J_uw(R) = J_0 + ½·π·ρ·W·(R⁴ − R_spool⁴), kg·m²
+pub fn parent_inertia(m: &Machine, r: f64) -> f64 {
+    m.parent_roll.spool_inertia_kg_m2 + paper(m, r, m.parent_roll.spool_radius_m)
+}
+
+/// J_wu/R², kg
+pub fn shipping_mass(m: &Machine, r: f64) -> f64 {
+    paper(m, r, m.shipping_roll.core_radius_m) / (r * r)
+}
+
+/// J/R² of the idle roll `i`, kg
+pub fn idle_mass(m: &Machine, i: usize) -> f64 {
+    m.idle[i].inertia_kg_m2 / m.idle[i].radius_m.powi(2)
+}
+
+fn driven(m: &Machine) -> [&DrivenRoll; 3] {
+    [&m.rear_drum, &m.front_drum, &m.rider_roll]
+}
+
+/// M = J_rd/R_rd² + J_fd/R_fd² + J_rr/R_rr² + J_wu/R_wu², kg
+pub fn windup_mass(m: &Machine, r_wu: f64) -> f64 {
+    let drums: f64 = driven(m)
+        .map(|roll| roll.inertia_kg_m2 / roll.radius_m.powi(2))
+        .iter()
+        .sum();
+    drums + shipping_mass(m, r_wu)
+}
+
+/// Σ c_j of the windup, N·s/m
+pub fn windup_friction(m: &Machine) -> f64 {
+    let drums: f64 = driven(m).map(|roll| roll.friction_n_s_m).iter().sum();
+    drums + m.shipping_roll.friction_n_s_m
+}
+
+/// {1} R_wu after a length: √(R_core² + z·L/π), m
+pub fn shipping_radius(m: &Machine, length: f64) -> f64 {
+    (m.shipping_roll.core_radius_m.powi(2) + m.web.caliper_m * length / PI).sqrt()
+}
+
+/// {4} R_uw after a length: √(R_full² − z·L/π), m
+pub fn parent_radius(m: &Machine, length: f64) -> f64 {
+    (m.parent_roll.full_radius_m.powi(2) - m.web.caliper_m * length / PI).sqrt()
+}
+
+/// A state with all its rates by the equations of motion, and the tensions that go with it.
+pub struct Motion {
+    pub rates: State<f64, 3>,
+    pub tension: [f64; 3],
+}
+
+/// The equations of motion of the threaded winder, without brakes.
+pub fn motion(m: &Machine, x: &State<f64, 3>, torque: &BySection<f64>) -> Motion {
+    let (ea, lengths) = (stiffness(m), lengths(m));
+    let v_uw = x.omega_uw * x.r_uw;
+    // web: d/dt [L/(1+ε)] = V_up/(1+ε_up) − V/(1+ε)
+    let stretched = |i: usize| 1.0 + x.strain[i];
+    let unstrained = |i: usize| x.v[i] / stretched(i);
+    let strain: [f64; 3] = std::array::from_fn(|i| {
+        let entering = if i == 0 { v_uw } else { unstrained(i - 1) };
+        stretched(i).powi(2) / lengths[i] * (unstrained(i) - entering)
+    });
+    let t: [f64; 3] =
+        std::array::from_fn(|i| (ea * (x.strain[i] + m.web.retardation_s * strain[i])).max(0.0));
+    let idle = |i: usize| (t[i + 1] - t[i] - m.idle[i].friction_n_s_m * x.v[i]) / idle_mass(m, i);
+    let v = x.v[2];
+    let r_wu = m.web.caliper_m * v / (TAU * x.r_wu);
+    let force = torque.rd / m.rear_drum.radius_m
+        + torque.fd / m.front_drum.radius_m
+        + torque.rr / m.rider_roll.radius_m;
+    let growth = shipping_mass(m, x.r_wu) * r_wu / x.r_wu;
+    let windup = (force - t[2] - (windup_friction(m) - growth) * v) / windup_mass(m, x.r_wu);
+    let parent = torque.uw + x.r_uw * (t[0] - m.parent_roll.friction_n_s_m * v_uw);
+    Motion {
+        rates: State {
+            strain,
+            v: [idle(0), idle(1), windup],
+            omega_uw: parent / parent_inertia(m, x.r_uw),
+            r_uw: -m.web.caliper_m * v_uw / (TAU * x.r_uw),
+            r_wu,
+            travel: v,
+        },
+        tension: t,
+    }
+}
+
+/// The winder in steady run: V_rd = `v`, `t_gr` in the measured span, all tensions at rest.
+pub fn steady(m: &Machine, v: f64, t_gr: f64, r_uw: f64, r_wu: f64) -> State<f64, 3> {
+    let ea = stiffness(m);
+    let t = steady_tensions(m, v, t_gr);
+    let strain = t.map(|t| t / ea);
+    // V/(1+ε) is the same everywhere
+    let unstrained = v / (1.0 + strain[2]);
+    State {
+        strain,
+        v: strain.map(|e| unstrained * (1.0 + e)),
+        omega_uw: unstrained / r_uw,
+        r_uw,
+        r_wu,
+        travel: 0.0,
+    }
+}
+
+/// t_gr − t_uw = c_gr·V, t_sr − t_gr = c_sr·V
+pub fn steady_tensions(m: &Machine, v: f64, t_gr: f64) -> [f64; 3] {
+    let friction = |i: usize| m.idle[i].friction_n_s_m * v;
+    [t_gr - friction(0), t_gr, t_gr + friction(1)]
+}
+
+/// Torques that accelerate all surfaces by `a` [m/s²] with `t_gr` in the measured span.
+///
+/// The parent roll also speeds up as its radius falls, ω̇ = (a − ω·Ṙ)/R, and the paper that arrives pushes the
+/// shipping roll.
+pub fn torques(m: &Machine, x: &State<f64, 3>, t_gr: f64, a: f64) -> BySection<f64> {
+    let idle = |i: usize| m.idle[i].friction_n_s_m * x.v[i] + idle_mass(m, i) * a;
+    let (t_uw, t_sr) = (t_gr - idle(0), t_gr + idle(1));
+    let (v_uw, v) = (x.omega_uw * x.r_uw, x.v[2]);
+    let layer = m.web.caliper_m / TAU;
+    let spin_up = (a + layer * x.omega_uw * x.omega_uw) / x.r_uw;
+    let parent =
+        parent_inertia(m, x.r_uw) * spin_up + x.r_uw * (m.parent_roll.friction_n_s_m * v_uw - t_uw);
+    let growth = shipping_mass(m, x.r_wu) * layer * v / x.r_wu.powi(2);
+    let windup = windup_mass(m, x.r_wu) * a + (windup_friction(m) - growth) * v + t_sr;
+    // shared by the drums as on a real machine; the rider roll idles
+    BySection {
+        uw: parent,
+        rd: 0.45 * windup * m.rear_drum.radius_m,
+        fd: 0.55 * windup * m.front_drum.radius_m,
+        rr: 0.0,
+    }
+}
+
+/// What `f32` may be off by, or what `f64` may.
+pub fn either<R: Real>(single: f64, double: f64) -> f64 {
+    if size_of::<R>() == size_of::<f32>() {
+        single
+    } else {
+        double
+    }
+}
+
+/// A winder under test.
+pub struct Bench<R: Real> {
+    pub machine: Machine,
+    pub winder: Winder<R, 3>,
+}
+
+impl<R: Real> Bench<R> {
+    /// At standstill, not threaded, in steps of [`H`].
+    pub fn new(machine: Machine) -> Self {
+        Self::with_step(machine, H)
+    }
+
+    /// In steps of `h` seconds.
+    pub fn with_step(machine: Machine, h: f64) -> Self {
+        let winder = Winder::new(&machine, h).unwrap();
+        Self { machine, winder }
+    }
+
+    /// Threaded, in the state `x`.
+    pub fn threaded(machine: Machine, x: &State<f64, 3>) -> Self {
+        let mut bench = Self::new(machine);
+        bench.winder.thread_at(R::ZERO);
+        bench.set(x);
+        bench
+    }
+
+    pub fn set(&mut self, x: &State<f64, 3>) {
+        self.winder.set_state(&x.map(R::of));
+    }
+
+    /// The state as `f64`.
+    pub fn x(&self) -> State<f64, 3> {
+        self.winder.state().map(Real::to_f64)
+    }
+
+    /// The tensions as `f64`, N.
+    pub fn t(&self) -> [f64; 3] {
+        self.winder.tension().map(Real::to_f64)
+    }
+
+    /// One step with torques.
+    pub fn step(&mut self, torque: &BySection<f64>) {
+        self.winder.step(&Actuators {
+            torque: torque.map(R::of),
+            ..Actuators::default()
+        });
+    }
+
+    /// One step of the machine accelerated by `a` with `t_gr` in the measured span.
+    pub fn pull(&mut self, t_gr: f64, a: f64) -> BySection<f64> {
+        let torque = torques(&self.machine, &self.x(), t_gr, a);
+        self.step(&torque);
+        torque
+    }
+}

@@ -1,0 +1,118 @@
+//! The winder's steps against an adaptive integrator of eighth order, and against themselves with other steps.
+
+use model_core::exchange::BySection;
+use model_core::machine::Machine;
+use model_core::plant::rk4::State;
+use model_core::real::Real;
+use nalgebra::SVector;
+use ode_solvers::dop_shared::OutputType;
+use ode_solvers::dop853::Dop853;
+
+use crate::form::{self, Bench, H, RUN};
+use crate::{in_both_scalars, near};
+
+in_both_scalars!(an_independent_integrator_agrees);
+
+type Vector = SVector<f64, 10>;
+
+struct Motion<'a>(&'a Machine, BySection<f64>);
+
+fn unpack(y: &Vector) -> State<f64, 3> {
+    State {
+        strain: [y[0], y[1], y[2]],
+        v: [y[3], y[4], y[5]],
+        omega_uw: y[6],
+        r_uw: y[7],
+        r_wu: y[8],
+        travel: y[9],
+    }
+}
+
+impl ode_solvers::System<f64, Vector> for Motion<'_> {
+    fn system(&self, _: f64, y: &Vector, dy: &mut Vector) {
+        let rates = form::motion(self.0, &unpack(y), &self.1).rates;
+        *dy = Vector::from_iterator(rates.iter());
+    }
+}
+
+/// The state after `time` under constant torques.
+fn dop853(m: &Machine, x: &State<f64, 3>, torque: &BySection<f64>, time: f64) -> State<f64, 3> {
+    let y = Vector::from_iterator(x.iter());
+    let mut stepper = Dop853::new(Motion(m, *torque), 0.0, time, time, y, 1e-13, 1e-15);
+    // every step as it is: the dense output extrapolates to the end
+    stepper.set_output(OutputType::Sparse);
+    stepper.integrate().unwrap();
+    unpack(stepper.y_out().last().unwrap())
+}
+
+/// Torques of an open-loop start: pull, accelerate, accelerate more, run, brake with the motors, in N·m.
+const SCHEDULE: [(f64, [f64; 4]); 5] = [
+    (2.0, [-1_300.0, 190.0, 230.0, 0.0]),
+    (10.0, [7_000.0, 1_900.0, 2_300.0, 20.0]),
+    (4.0, [9_000.0, 2_300.0, 2_700.0, 20.0]),
+    (20.0, [-3_000.0, 800.0, 1_000.0, 10.0]),
+    (6.0, [-9_000.0, -200.0, -300.0, -10.0]),
+];
+
+/// Both sides have slow oscillations, slack none: what is left is the step's own error, and f32's.
+fn an_independent_integrator_agrees<R: Real>() {
+    let m = Machine::news_8000();
+    let stall = m.operation.stall_share * form::tension(&m);
+    let mut exact = form::steady(&m, 0.0, stall, m.parent_roll.full_radius_m, 0.05);
+    let mut bench = Bench::<R>::threaded(m.clone(), &exact);
+    let mut travel = 0.0;
+    for (time, [uw, rd, fd, rr]) in SCHEDULE {
+        let torque = BySection { uw, rd, fd, rr };
+        exact = dop853(&m, &exact, &torque, time);
+        for _ in 0..(time / H).round() as u32 {
+            bench.step(&torque);
+            travel += bench.x().travel;
+        }
+        let x = bench.x();
+        let speeds = x.v.into_iter().chain([x.omega_uw]);
+        for (v, exact) in speeds.zip(exact.v.into_iter().chain([exact.omega_uw])) {
+            near("speed", v, exact, form::either::<R>(2e-6, 2e-8));
+        }
+        for (t, exact) in bench
+            .t()
+            .into_iter()
+            .zip(form::motion(&m, &exact, &torque).tension)
+        {
+            near("tension", t, exact, form::either::<R>(0.02, 2e-4));
+        }
+        // half an ulp of f32 at 1.5 m
+        let ulp = form::either::<R>(0.07e-6, 1e-12);
+        near("r_uw", x.r_uw, exact.r_uw, ulp);
+        near("r_wu", x.r_wu, exact.r_wu, ulp);
+        near("way", travel, exact.travel, form::either::<R>(1e-5, 1e-8));
+    }
+}
+
+/// Largest errors of strain and of speed after a quarter of a second of a smooth stretch: taut web, constant
+/// torques that change speed and tension.
+fn errors(h: f64) -> [f64; 2] {
+    let m = Machine::news_8000();
+    let t = form::tension(&m);
+    let x = form::steady(&m, RUN, t, 1.2, 0.3);
+    let torque = form::torques(&m, &x, 1.2 * t, 0.3);
+    let time = 0.24;
+    let exact = dop853(&m, &x, &torque, time);
+    let mut bench = Bench::<f64>::with_step(m, h);
+    bench.winder.thread_at(0.0);
+    bench.set(&x);
+    for _ in 0..(time / h).round() as u32 {
+        bench.step(&torque);
+    }
+    let error = bench.x().zip(&exact, |a, b| (a - b).abs());
+    [error.strain, error.v].map(|errors| errors.into_iter().fold(0.0, f64::max))
+}
+
+#[test]
+fn halving_the_step_divides_the_error_by_sixteen() {
+    let errors = [0.008, 0.004, 0.002].map(errors);
+    for pair in errors.windows(2) {
+        for (coarse, fine) in pair[0].into_iter().zip(pair[1]) {
+            near("ratio of errors", coarse / fine, 16.0, 2.0);
+        }
+    }
+}

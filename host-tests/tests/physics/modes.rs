@@ -1,0 +1,99 @@
+//! Small-signal modes of the web and the rolls, as eigenvalues of the linearised winder.
+
+use model_core::machine::Machine;
+use model_core::plant::rk4::State;
+use nalgebra::{Complex, DMatrix};
+
+use crate::form::{self, Bench, RUN};
+use crate::near;
+
+/// A step so small that the step's own error does not show, s.
+const TINY: f64 = 1e-6;
+/// Variables that move in a mode: three strains, three speeds, ω_uw. Radii stand still.
+const MOVING: usize = 7;
+/// V_rd among them.
+const DRUMS: usize = 5;
+
+/// The moving variables by number.
+fn variable(x: &mut State<f64, 3>, i: usize) -> &mut f64 {
+    match i {
+        0..3 => &mut x.strain[i],
+        3..6 => &mut x.v[i - 3],
+        _ => &mut x.omega_uw,
+    }
+}
+
+/// ∂ẋ/∂x of the winder about the steady run at `v`, by central differences of one tiny step.
+fn linearised(v: f64) -> DMatrix<f64> {
+    let m = Machine::news_8000();
+    let t = form::tension(&m);
+    let x = form::steady(&m, v, t, m.parent_roll.full_radius_m, 0.05);
+    let torque = form::torques(&m, &x, t, 0.0);
+    let mut bench = Bench::<f64>::with_step(m, TINY);
+    bench.winder.thread_at(0.0);
+    let mut moved = |i: usize, by: f64| {
+        let mut x = x;
+        *variable(&mut x, i) += by;
+        bench.set(&x);
+        bench.step(&torque);
+        let mut y = bench.x();
+        std::array::from_fn::<f64, MOVING, _>(|j| *variable(&mut y, j) - *variable(&mut x, j))
+    };
+    let mut jacobian = DMatrix::zeros(MOVING, MOVING);
+    for i in 0..MOVING {
+        // 1 % of a tension of 2 800 N, 0.01 m/s, 0.01 rad/s
+        let by = if i < 3 { 1e-5 } else { 1e-2 };
+        let (up, down) = (moved(i, by), moved(i, -by));
+        for j in 0..MOVING {
+            jacobian[(j, i)] = (up[j] - down[j]) / (2.0 * by * TINY);
+        }
+    }
+    jacobian
+}
+
+/// Natural frequency, rad/s, and damping ratio of every oscillation, the slowest first.
+fn modes(matrix: DMatrix<f64>) -> Vec<(f64, f64)> {
+    let mut modes: Vec<_> = matrix
+        .complex_eigenvalues()
+        .iter()
+        .filter(|s: &&Complex<f64>| s.im > 1e-3)
+        .map(|s| (s.norm(), -s.re / s.norm()))
+        .collect();
+    modes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    modes
+}
+
+fn held(v: f64) -> Vec<(f64, f64)> {
+    modes(linearised(v).remove_row(DRUMS).remove_column(DRUMS))
+}
+
+fn free(v: f64) -> Vec<(f64, f64)> {
+    modes(linearised(v))
+}
+
+#[test]
+fn modes_lie_where_the_closed_form_has_them() {
+    let tables = [
+        ("drums held", held(0.5), [2.99, 23.6, 56.5]),
+        ("drums free", free(0.5), [4.57, 24.0, 56.7]),
+    ];
+    for (what, modes, expected) in tables {
+        assert_eq!(modes.len(), 3, "{what}: {modes:?}");
+        for ((omega, _), expected) in modes.iter().zip(expected) {
+            near(what, *omega, expected, 0.005 * expected);
+        }
+    }
+}
+
+/// The web's transport damps the lowest mode at speed, and hardly at crawl.
+#[test]
+fn the_lowest_mode_is_damped_by_half_at_full_speed_and_hardly_at_thread_speed() {
+    for (v, damping, tolerance) in [
+        (RUN, 0.537, 0.005),
+        (0.5, 0.0150, 2e-4),
+        (25.0 / 60.0, 0.0138, 2e-4),
+    ] {
+        let (_, ratio) = held(v)[0];
+        near("damping ratio", ratio, damping, tolerance);
+    }
+}
