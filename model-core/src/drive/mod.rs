@@ -36,7 +36,7 @@ const TENSION_ROUNDING_S: f64 = 2.0;
 
 /// All regulators.
 #[derive(Clone, Copy, Debug)]
-pub struct Drive<R> {
+pub struct Drive<R: Real> {
     speed: SCurve<R>,
     tension: SCurve<R>,
     /// Largest rate of the tension reference, N/s, and its change, N/s².

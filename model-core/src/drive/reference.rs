@@ -2,17 +2,20 @@
 //!
 //! Not here: which speed to go to; that is the logic's.
 
-use crate::real::Real;
+use crate::real::{Real, Sum};
+
+/// A rate is all but gone when it is below so many times its change in a period.
+const GONE: f64 = 1.25;
 
 /// A reference that goes to its target with limited rate and limited change of rate: the S-curve.
 ///
 /// Target and limits may change at any time; value and rate stay continuous. For the web speed the rate is the
 /// acceleration and its change the jerk.
 #[derive(Clone, Copy, Debug)]
-pub struct SCurve<R> {
+pub struct SCurve<R: Real> {
     period: R,
     per_period: R,
-    value: R,
+    value: R::Sum,
     rate: R,
 }
 
@@ -22,14 +25,14 @@ impl<R: Real> SCurve<R> {
         Self {
             period: R::of(period),
             per_period: R::of(1.0 / period),
-            value: R::ZERO,
+            value: R::Sum::at(R::ZERO),
             rate: R::ZERO,
         }
     }
 
     /// The reference.
     pub fn value(&self) -> R {
-        self.value
+        self.value.value()
     }
 
     /// Its rate, for a second.
@@ -39,7 +42,7 @@ impl<R: Real> SCurve<R> {
 
     /// Jumps to a value, at rest: for a drive that takes over a turning machine.
     pub fn set(&mut self, value: R) {
-        (self.value, self.rate) = (value, R::ZERO);
+        (self.value, self.rate) = (R::Sum::at(value), R::ZERO);
     }
 
     /// One period towards `target` with at most `rate`, which changes by at most `jerk` in a second.
@@ -47,8 +50,11 @@ impl<R: Real> SCurve<R> {
     /// Falling by δ = jerk·T each period, a rate r covers (r² + r·δ)/(2·jerk) until it is gone. So the largest
     /// one that still rounds off into the target is r = −δ/2 + √(δ²/4 + 2·jerk·|target − x|); less than one
     /// period away it is |target − x|/T. The ramp ends on the target exactly, without overshoot.
+    ///
+    /// Rounding may leave the last steps some hundredths too long; what would pass the target with a rate that
+    /// is all but gone, arrives.
     pub fn step(&mut self, target: R, rate: R, jerk: R) {
-        let distance = target - self.value;
+        let distance = target - self.value();
         let change = jerk * self.period;
         let half = change * R::of(0.5);
         let rounding = (half * half + (jerk + jerk) * distance.abs()).sqrt() - half;
@@ -56,11 +62,14 @@ impl<R: Real> SCurve<R> {
         let size = rounding.min(rate).min(last);
         let wanted = if distance < R::ZERO { -size } else { size };
         self.rate = wanted.clamp(self.rate - change, self.rate + change);
-        let arrives = self.rate == wanted && size == last;
-        self.value = if arrives {
-            target
+        let way = self.rate * self.period;
+        let gone = self.rate.abs() <= change * R::of(GONE);
+        let passes = (distance - way) * distance <= R::ZERO;
+        let lands = size == last && self.rate == wanted;
+        if lands || (gone && passes) {
+            self.value = R::Sum::at(target);
         } else {
-            self.value + self.rate * self.period
-        };
+            self.value.add(way);
+        }
     }
 }
