@@ -9,6 +9,8 @@ use heapless::Vec;
 
 /// The most web spans a machine can have.
 pub const MAX_SPANS: usize = 8;
+/// The most points in the table of the rider roll's load.
+pub const MAX_RIDER_LOADS: usize = 16;
 
 /// The web.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +58,8 @@ pub struct ParentRoll {
     pub spool_inertia_kg_m2: f64,
     /// Friction referred to the surface, N·s/m.
     pub friction_n_s_m: f64,
+    /// Distance of the axis of rotation from the centre, m.
+    pub eccentricity_m: f64,
 }
 
 /// A web span and the idle roll at its end, in the web's direction.
@@ -69,6 +73,8 @@ pub struct IdleRoll {
     pub inertia_kg_m2: f64,
     /// Friction referred to the surface, N·s/m.
     pub friction_n_s_m: f64,
+    /// Distance of the axis of rotation from the centre, m.
+    pub eccentricity_m: f64,
 }
 
 /// A driven roll of the windup.
@@ -91,6 +97,66 @@ pub struct ShippingRoll {
     pub full_radius_m: f64,
     /// Rolling resistance referred to the surface, N·s/m.
     pub friction_n_s_m: f64,
+}
+
+/// Load of the rider roll at one diameter of the shipping roll.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RiderLoad {
+    /// Diameter of the shipping roll, m.
+    pub diameter_m: f64,
+    /// Load per width Q, N/m.
+    pub load_n_m: f64,
+}
+
+/// The contacts of the shipping roll with both drums and the rider roll.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nips {
+    /// Whether the rolls may slip on each other; otherwise the windup turns as one body.
+    pub slip: bool,
+    /// Coefficient of sliding friction between drum and paper μ.
+    pub friction: f64,
+    /// Static over sliding friction.
+    pub static_ratio: f64,
+    /// Gap between the drums s, m.
+    pub drum_gap_m: f64,
+    /// Load of the rider roll over the diameter of the shipping roll, linear between the points.
+    pub rider_load: Vec<RiderLoad, MAX_RIDER_LOADS>,
+}
+
+/// How tight the shipping roll is wound, and what that does to its layers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WoundOnTension {
+    /// Whether the thickness of a wound layer follows the wound-on tension; otherwise it is the caliper.
+    pub compresses: bool,
+    /// Gain of the web tension k_t.
+    pub tension_gain: f64,
+    /// Gain of the front drum's force k_F.
+    pub force_gain: f64,
+    /// Coefficient of friction paper on paper μ_ww.
+    pub paper_friction: f64,
+    /// Nip force per width at which its effect has fallen to a half N_0, N/m.
+    pub nip_scale_n_m: f64,
+    /// Wound-on tension per width at which a layer has the caliper WOT_ref, N/m.
+    pub reference_n_m: f64,
+    /// Loss of thickness κ for a doubled wound-on tension.
+    pub hardness: f64,
+}
+
+/// The load cells under a roll that the web wraps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadCells {
+    /// Which idle roll, from 0, lies on them.
+    pub roll: usize,
+    /// Whether they feel the spans on both sides of the roll, as they do; otherwise the span after it alone.
+    pub both_spans: bool,
+    /// Wrap angle of the web β, rad.
+    pub wrap_rad: f64,
+    /// Wrap angle that the amplifier has been calibrated for β_cal, rad.
+    pub calibrated_wrap_rad: f64,
+    /// Error of the zero, N.
+    pub tare_n: f64,
+    /// Time constant of the filter, s.
+    pub filter_s: f64,
 }
 
 /// A motor, referred to the shaft of its roll.
@@ -128,6 +194,10 @@ pub struct Brakes {
     pub fd_n_m: f64,
     /// Time from command to effect, s.
     pub delay_s: f64,
+    /// Static over sliding friction.
+    pub static_ratio: f64,
+    /// Half width ΔV of the stiction band of the paper's brake model (figure 2), m/s; 0 for the set-valued law.
+    pub karnopp_m_s: f64,
 }
 
 /// How the machine is run.
@@ -176,10 +246,8 @@ pub struct Machine {
     pub parent_roll: ParentRoll,
     /// Idle rolls from the unwind to the windup, each with the span before it.
     pub idle: Vec<IdleRoll, { MAX_SPANS - 1 }>,
-    /// Which idle roll, from 0, carries the load cells: they feel the span after it.
-    pub load_cell_roll: usize,
-    /// Time constant of the load cells' filter, s.
-    pub load_cell_filter_s: f64,
+    /// Load cells.
+    pub load_cells: LoadCells,
     /// Length of the last span, to the rear drum, m.
     pub last_span_m: f64,
     /// Rear drum.
@@ -190,6 +258,10 @@ pub struct Machine {
     pub rider_roll: DrivenRoll,
     /// Shipping roll.
     pub shipping_roll: ShippingRoll,
+    /// Contacts of the shipping roll.
+    pub nips: Nips,
+    /// Tightness of the shipping roll.
+    pub wound_on_tension: WoundOnTension,
     /// Motors.
     pub motors: Motors,
     /// Brakes.
@@ -260,6 +332,7 @@ impl Machine {
             radius_m: 0.20,
             inertia_kg_m2: 47.5,
             friction_n_s_m: 6.25,
+            eccentricity_m: 0.0,
         };
         // 2 spreader rolls
         let sr = IdleRoll {
@@ -267,6 +340,7 @@ impl Machine {
             radius_m: 0.15,
             inertia_kg_m2: 12.0,
             friction_n_s_m: 7.2,
+            eccentricity_m: 0.0,
         };
         Self {
             web: Web {
@@ -283,10 +357,17 @@ impl Machine {
                 expire_radius_m: 0.45,
                 spool_inertia_kg_m2: 950.0,
                 friction_n_s_m: 20.0,
+                eccentricity_m: 0.0,
             },
             idle: Vec::from_iter([gr, sr]),
-            load_cell_roll: 0,
-            load_cell_filter_s: 0.05,
+            load_cells: LoadCells {
+                roll: 0,
+                both_spans: false,
+                wrap_rad: 1.0,
+                calibrated_wrap_rad: 1.0,
+                tare_n: 0.0,
+                filter_s: 0.05,
+            },
             last_span_m: 2.5,
             rear_drum: drum,
             front_drum: drum,
@@ -299,6 +380,40 @@ impl Machine {
                 core_radius_m: 0.05,
                 full_radius_m: 0.625,
                 friction_n_s_m: 13.6,
+            },
+            nips: Nips {
+                slip: false,
+                friction: 0.35,
+                static_ratio: 1.0,
+                drum_gap_m: 0.012,
+                // a nip of 3.0 kN/m until the roll's own weight takes over
+                rider_load: [
+                    (0.10, 2.53e3),
+                    (0.20, 3.26e3),
+                    (0.30, 3.54e3),
+                    (0.40, 3.53e3),
+                    (0.50, 3.32e3),
+                    (0.60, 2.94e3),
+                    (0.70, 2.41e3),
+                    (0.80, 1.74e3),
+                    (0.90, 0.94e3),
+                    (1.00, 0.40e3),
+                ]
+                .map(|(diameter_m, load_n_m)| RiderLoad {
+                    diameter_m,
+                    load_n_m,
+                })
+                .into_iter()
+                .collect(),
+            },
+            wound_on_tension: WoundOnTension {
+                compresses: false,
+                tension_gain: 1.0,
+                force_gain: 0.5,
+                paper_friction: 0.19,
+                nip_scale_n_m: 6.0e3,
+                reference_n_m: 750.0,
+                hardness: 0.01,
             },
             motors: Motors {
                 uw: Motor {
@@ -318,6 +433,8 @@ impl Machine {
                 rd_n_m: 5e3,
                 fd_n_m: 5e3,
                 delay_s: 0.040,
+                static_ratio: 1.0,
+                karnopp_m_s: 0.0,
             },
             operation: Operation {
                 max_speed_m_s: 2500.0 / SECONDS_PER_MINUTE,
@@ -378,6 +495,12 @@ impl Machine {
             1e5,
         )?;
         check("parent_roll.friction_n_s_m", p.friction_n_s_m, 0.0, 1e4)?;
+        check(
+            "parent_roll.eccentricity_m",
+            p.eccentricity_m,
+            0.0,
+            0.1 * p.spool_radius_m,
+        )?;
 
         check(
             "idle (number of rolls)",
@@ -390,15 +513,35 @@ impl Machine {
             check("idle.radius_m", roll.radius_m, 0.01, 2.0)?;
             check("idle.inertia_kg_m2", roll.inertia_kg_m2, 1e-5, 1e4)?;
             check("idle.friction_n_s_m", roll.friction_n_s_m, 0.0, 1e4)?;
+            check(
+                "idle.eccentricity_m",
+                roll.eccentricity_m,
+                0.0,
+                0.1 * roll.radius_m,
+            )?;
         }
         check("last_span_m", self.last_span_m, 0.05, 50.0)?;
+        let l = &self.load_cells;
         check(
-            "load_cell_roll",
-            self.load_cell_roll as f64,
+            "load_cells.roll",
+            l.roll as f64,
             0.0,
             (self.idle.len() - 1) as f64,
         )?;
-        check("load_cell_filter_s", self.load_cell_filter_s, 0.004, 10.0)?;
+        check(
+            "load_cells.wrap_rad",
+            l.wrap_rad,
+            0.05,
+            core::f64::consts::PI,
+        )?;
+        check(
+            "load_cells.calibrated_wrap_rad",
+            l.calibrated_wrap_rad,
+            0.05,
+            core::f64::consts::PI,
+        )?;
+        check("load_cells.tare_n", l.tare_n, -1e5, 1e5)?;
+        check("load_cells.filter_s", l.filter_s, 0.004, 10.0)?;
 
         let rolls = [
             (
@@ -441,6 +584,36 @@ impl Machine {
         )?;
         check("shipping_roll.friction_n_s_m", s.friction_n_s_m, 0.0, 1e4)?;
 
+        let n = &self.nips;
+        check("nips.friction", n.friction, 0.01, 2.0)?;
+        check("nips.static_ratio", n.static_ratio, 1.0, 2.0)?;
+        // the bare core must not fall through
+        check("nips.drum_gap_m", n.drum_gap_m, 0.0, 1.9 * s.core_radius_m)?;
+        check(
+            "nips.rider_load (number of points)",
+            n.rider_load.len() as f64,
+            1.0,
+            MAX_RIDER_LOADS as f64,
+        )?;
+        let mut last = 0.0;
+        for point in &n.rider_load {
+            check("nips.rider_load.diameter_m", point.diameter_m, last, 5.0)?;
+            check("nips.rider_load.load_n_m", point.load_n_m, 0.0, 1e5)?;
+            last = point.diameter_m;
+        }
+        let t = &self.wound_on_tension;
+        check("wound_on_tension.tension_gain", t.tension_gain, 0.0, 2.0)?;
+        check("wound_on_tension.force_gain", t.force_gain, 0.0, 2.0)?;
+        check(
+            "wound_on_tension.paper_friction",
+            t.paper_friction,
+            0.0,
+            2.0,
+        )?;
+        check("wound_on_tension.nip_scale_n_m", t.nip_scale_n_m, 1.0, 1e6)?;
+        check("wound_on_tension.reference_n_m", t.reference_n_m, 1.0, 1e6)?;
+        check("wound_on_tension.hardness", t.hardness, 0.0, 0.1)?;
+
         let motors = [
             (
                 ["motors.uw.power_w", "motors.uw.torque_n_m"],
@@ -469,6 +642,8 @@ impl Machine {
         check("brakes.rd_n_m", b.rd_n_m, 0.0, 1e6)?;
         check("brakes.fd_n_m", b.fd_n_m, 0.0, 1e6)?;
         check("brakes.delay_s", b.delay_s, 0.0, MAX_BRAKE_DELAY_S)?;
+        check("brakes.static_ratio", b.static_ratio, 1.0, 2.0)?;
+        check("brakes.karnopp_m_s", b.karnopp_m_s, 0.0, 1.0)?;
 
         let o = &self.operation;
         check("operation.max_speed_m_s", o.max_speed_m_s, 0.1, 60.0)?;

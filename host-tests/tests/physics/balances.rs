@@ -151,6 +151,7 @@ fn machines() -> impl Strategy<Value = Machine> {
         radius_m: roll.radius_m * f[1],
         inertia_kg_m2: roll.inertia_kg_m2 * f[2],
         friction_n_s_m: roll.friction_n_s_m * f[3],
+        ..roll
     };
     let drum = move |roll: &DrivenRoll, f: [f64; 4]| DrivenRoll {
         radius_m: roll.radius_m * f[1],

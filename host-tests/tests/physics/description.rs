@@ -38,7 +38,45 @@ const PARAMETERS: &[Parameter] = &[
     ("idle.radius_m", |m| &mut m.idle[1].radius_m),
     ("idle.inertia_kg_m2", |m| &mut m.idle[1].inertia_kg_m2),
     ("idle.friction_n_s_m", |m| &mut m.idle[1].friction_n_s_m),
-    ("load_cell_filter_s", |m| &mut m.load_cell_filter_s),
+    ("idle.eccentricity_m", |m| &mut m.idle[0].eccentricity_m),
+    ("idle.eccentricity_m", |m| &mut m.idle[1].eccentricity_m),
+    ("parent_roll.eccentricity_m", |m| {
+        &mut m.parent_roll.eccentricity_m
+    }),
+    ("load_cells.wrap_rad", |m| &mut m.load_cells.wrap_rad),
+    ("load_cells.calibrated_wrap_rad", |m| {
+        &mut m.load_cells.calibrated_wrap_rad
+    }),
+    ("load_cells.filter_s", |m| &mut m.load_cells.filter_s),
+    ("nips.friction", |m| &mut m.nips.friction),
+    ("nips.static_ratio", |m| &mut m.nips.static_ratio),
+    ("nips.drum_gap_m", |m| &mut m.nips.drum_gap_m),
+    ("nips.rider_load.diameter_m", |m| {
+        &mut m.nips.rider_load[9].diameter_m
+    }),
+    ("nips.rider_load.load_n_m", |m| {
+        &mut m.nips.rider_load[0].load_n_m
+    }),
+    ("wound_on_tension.tension_gain", |m| {
+        &mut m.wound_on_tension.tension_gain
+    }),
+    ("wound_on_tension.force_gain", |m| {
+        &mut m.wound_on_tension.force_gain
+    }),
+    ("wound_on_tension.paper_friction", |m| {
+        &mut m.wound_on_tension.paper_friction
+    }),
+    ("wound_on_tension.nip_scale_n_m", |m| {
+        &mut m.wound_on_tension.nip_scale_n_m
+    }),
+    ("wound_on_tension.reference_n_m", |m| {
+        &mut m.wound_on_tension.reference_n_m
+    }),
+    ("wound_on_tension.hardness", |m| {
+        &mut m.wound_on_tension.hardness
+    }),
+    ("brakes.static_ratio", |m| &mut m.brakes.static_ratio),
+    ("brakes.karnopp_m_s", |m| &mut m.brakes.karnopp_m_s),
     ("last_span_m", |m| &mut m.last_span_m),
     ("rear_drum.radius_m", |m| &mut m.rear_drum.radius_m),
     ("rear_drum.inertia_kg_m2", |m| {
@@ -113,8 +151,8 @@ fn the_table_of_parameters_is_whole() {
     for (_, parameter) in PARAMETERS {
         *parameter(&mut m) = f64::NAN;
     }
-    m.load_cell_roll = 0;
-    let text = format!("{m:?}").replace("load_cell_roll: 0", "");
+    m.load_cells.roll = 0;
+    let text = format!("{m:?}").replace("roll: 0", "");
     let numbers: Vec<_> = text
         .split([' ', ',', '[', ']'])
         .filter(|word| word.parse::<f64>().is_ok_and(|number| !number.is_nan()))
@@ -186,7 +224,7 @@ fn parameters_that_contradict_each_other_are_refused_by_name() {
         ("operation.tension_n_m", |m| {
             m.operation.tension_n_m = 1001.0
         }),
-        ("load_cell_roll", |m| m.load_cell_roll = 2),
+        ("load_cells.roll", |m| m.load_cells.roll = 2),
         ("idle (number of rolls)", |m| m.idle.clear()),
     ];
     for (name, change) in cases {

@@ -62,7 +62,7 @@ impl<R: Real> Drums<R> {
     /// that it does not work against the web.
     pub fn new(machine: &Machine, period: f64) -> Self {
         let (rd, fd, rr) = (&machine.rear_drum, &machine.front_drum, &machine.rider_roll);
-        let path = &machine.idle[machine.load_cell_roll + 1..];
+        let path = &machine.idle[machine.load_cells.roll + 1..];
         let shipping = &machine.shipping_roll;
         let (d_core, d_full) = (2.0 * shipping.core_radius_m, 2.0 * shipping.full_radius_m);
         let [share_core, share_full] = machine.operation.front_share;

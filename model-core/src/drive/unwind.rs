@@ -93,7 +93,7 @@ pub struct UnwindTask<R> {
 impl<R: Real> Unwind<R> {
     /// For a machine, stepped every `period` seconds.
     pub fn new(machine: &Machine, period: f64) -> Self {
-        let path = &machine.idle[..=machine.load_cell_roll];
+        let path = &machine.idle[..=machine.load_cells.roll];
         let stiffness = super::web_stiffness(machine);
         let r = R::of;
         Self {

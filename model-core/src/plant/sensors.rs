@@ -47,7 +47,7 @@ impl<R: Real> Sensors<R> {
         let circumference = core::f64::consts::TAU * machine.rear_drum.radius_m;
         Self {
             coefficients: Coefficients {
-                filter: R::of(-libm::expm1(-h / machine.load_cell_filter_s)),
+                filter: R::of(-libm::expm1(-h / machine.load_cells.filter_s)),
                 per_radius: BySection {
                     uw: R::ZERO,
                     rd: per_radius(&machine.rear_drum),
@@ -55,7 +55,7 @@ impl<R: Real> Sensors<R> {
                     rr: per_radius(&machine.rider_roll),
                 },
                 pulses: R::of(machine.encoder_pulses / circumference),
-                load_cell_span: machine.load_cell_roll + 1,
+                load_cell_span: machine.load_cells.roll + 1,
             },
             tension: R::ZERO,
             count: 0,
