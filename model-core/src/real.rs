@@ -36,6 +36,8 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// √x, correctly rounded; of a negative number, NaN.
     fn sqrt(self) -> Self;
+    /// cos x, of an angle within ±2·π; the same bits on every machine.
+    fn cos(self) -> Self;
     /// The bits folded to 32, for comparing trajectories.
     fn fingerprint(self) -> u32;
     /// The whole number, exactly or nearest.
@@ -136,6 +138,9 @@ impl Real for f32 {
     fn sqrt(self) -> Self {
         libm::sqrtf(self)
     }
+    fn cos(self) -> Self {
+        libm::cosf(self)
+    }
     fn of_i32(n: i32) -> Self {
         n as f32
     }
@@ -161,6 +166,9 @@ impl Real for f64 {
     }
     fn sqrt(self) -> Self {
         libm::sqrt(self)
+    }
+    fn cos(self) -> Self {
+        libm::cos(self)
     }
     fn of_i32(n: i32) -> Self {
         n as f64

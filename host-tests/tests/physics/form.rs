@@ -112,6 +112,7 @@ pub fn motion(m: &Machine, x: &State<f64, 3>, torque: &BySection<f64>) -> Motion
         rates: State {
             strain,
             v: [idle(0), idle(1), windup],
+            windup: [windup; 3],
             omega_uw: parent / parent_inertia(m, x.r_uw),
             r_uw: -m.web.caliper_m * v_uw / (TAU * x.r_uw),
             r_wu,
@@ -131,6 +132,7 @@ pub fn steady(m: &Machine, v: f64, t_gr: f64, r_uw: f64, r_wu: f64) -> State<f64
     State {
         strain,
         v: strain.map(|e| unstrained * (1.0 + e)),
+        windup: [v; 3],
         omega_uw: unstrained / r_uw,
         r_uw,
         r_wu,

@@ -13,7 +13,7 @@ use crate::{in_both_scalars, near};
 
 in_both_scalars!(an_independent_integrator_agrees);
 
-type Vector = SVector<f64, 10>;
+type Vector = SVector<f64, 13>;
 
 struct Motion<'a>(&'a Machine, BySection<f64>);
 
@@ -21,10 +21,11 @@ fn unpack(y: &Vector) -> State<f64, 3> {
     State {
         strain: [y[0], y[1], y[2]],
         v: [y[3], y[4], y[5]],
-        omega_uw: y[6],
-        r_uw: y[7],
-        r_wu: y[8],
-        travel: y[9],
+        windup: [y[6], y[7], y[8]],
+        omega_uw: y[9],
+        r_uw: y[10],
+        r_wu: y[11],
+        travel: y[12],
     }
 }
 

@@ -1,10 +1,10 @@
-//! Mechanical brakes: Coulomb friction as the set-valued law it is.
+//! Mechanical brakes: Coulomb friction as the set-valued law it is, and the paper's Karnopp model beside it.
 //!
-//! Not here: brake temperature, hydraulics (a pure delay stands for them), static above kinetic friction.
+//! Not here: brake temperature, hydraulics (a pure delay stands for them).
 //!
 //! The paper's figure 2 holds a roll by setting its *acceleration* to zero inside a band ±ΔV; the roll creeps on
-//! with whatever speed it had when it entered. Here the friction force of a step is the one that would bring
-//! the body to rest by the end of the step, as far as the brake can; there is no band to choose.
+//! with whatever speed it had when it entered. The set-valued law has no band: the friction of a step is the
+//! force that would bring the body to rest by the end of the step, as far as the brake can.
 
 use crate::machine::MAX_BRAKE_DELAY_S;
 use crate::real::Real;
@@ -14,25 +14,122 @@ use crate::real::Real;
 pub struct Friction<R> {
     /// λ, constant over the step: a force in N or a torque in N·m.
     pub lambda: R,
-    /// The brake can hold the body: its speed is exactly zero after the step.
+    /// The brake holds the body: its speed is exactly zero after the step.
     pub sticks: bool,
 }
 
-impl<R: Real> Friction<R> {
+/// Which law a closed brake follows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Law<R> {
+    /// λ = clamp(M·V/h + F_ext, ±F_b), with 1/h.
+    SetValued {
+        /// 1/h, 1/s.
+        per_step: R,
+    },
+    /// Figure 2 of the paper, with its ΔV.
+    Karnopp {
+        /// Half width of the stiction band.
+        band: R,
+    },
+}
+
+/// A brake over one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Brake<R> {
+    /// F_b while the body moves; zero when the brake is open.
+    sliding: R,
+    /// F_b while it stands.
+    sticking: R,
+    law: Law<R>,
+}
+
+impl<R: Real> Brake<R> {
     /// No brake.
     pub const NONE: Self = Self {
-        lambda: R::ZERO,
-        sticks: false,
+        sliding: R::ZERO,
+        sticking: R::ZERO,
+        law: Law::SetValued { per_step: R::ZERO },
     };
 
-    /// λ = clamp(M·V/h + F_ext, ±F_b), with the body's momentum M·V, the external force F_ext (viscous friction
-    /// included) at the start of the step, and the brake's force F_b.
-    #[inline(always)]
-    pub fn of(momentum: R, external: R, brake: R, per_step: R) -> Self {
-        let needed = momentum * per_step + external;
+    /// A closed brake.
+    pub fn closed(sliding: R, static_ratio: R, law: Law<R>) -> Self {
         Self {
-            lambda: needed.limit(brake),
-            sticks: needed.abs() < brake,
+            sliding,
+            sticking: sliding * static_ratio,
+            law,
+        }
+    }
+
+    /// The same brake by another law.
+    pub fn following(self, law: Law<R>) -> Self {
+        Self { law, ..self }
+    }
+
+    /// This brake if `closed`, otherwise none.
+    pub fn when(self, closed: bool) -> Self {
+        if closed { self } else { Self::NONE }
+    }
+
+    /// Both brakes on one body.
+    pub fn with(&self, other: &Self) -> Self {
+        Self {
+            sliding: self.sliding + other.sliding,
+            sticking: self.sticking + other.sticking,
+            law: if other.sliding > R::ZERO {
+                other.law
+            } else {
+                self.law
+            },
+        }
+    }
+
+    /// What part of the friction of `all` this one of them gives.
+    pub fn share_of(&self, all: &Self) -> R {
+        if self.sliding > R::ZERO {
+            self.sliding / all.sliding
+        } else {
+            R::ZERO
+        }
+    }
+
+    /// The friction on a body of inertia M and speed V, under the external force F_ext (viscous friction
+    /// included) at the start of the step.
+    #[inline(always)]
+    pub fn hold(&self, mass: R, v: R, external: R) -> Friction<R> {
+        if self.sliding <= R::ZERO {
+            return Friction {
+                lambda: R::ZERO,
+                sticks: false,
+            };
+        }
+        match self.law {
+            Law::SetValued { per_step } => {
+                let needed = mass * v * per_step + external;
+                let stands = v == R::ZERO;
+                let limit = if stands { self.sticking } else { self.sliding };
+                let sticks = needed.abs() < limit;
+                Friction {
+                    lambda: if sticks {
+                        needed
+                    } else {
+                        needed.limit(self.sliding)
+                    },
+                    sticks,
+                }
+            }
+            Law::Karnopp { band } => {
+                let balanced = v.abs() < band && external.abs() < self.sticking;
+                let against = if v.abs() < band { external } else { v };
+                let opposing = if against < R::ZERO {
+                    -self.sliding
+                } else {
+                    self.sliding
+                };
+                Friction {
+                    lambda: if balanced { external } else { opposing },
+                    sticks: false,
+                }
+            }
         }
     }
 }

@@ -1,27 +1,31 @@
 //! The winder and its web: what the drives act on and the sensors look at.
 //!
-//! Not here: regulators, logic, sensors' faults. The windup does not slip, rolls are round.
+//! Not here: regulators, logic, sensors' faults, bending and vibration of rolls.
 //!
 //! The web runs from the unwind `uw` over idle rolls (`gr`, `sr`) to the rear drum `rd`. Running direction is
 //! positive for speeds and motor torques; a span pulls the roll before it forward and holds the roll after it
 //! back. A span is named after the roll it leaves.
 
+pub mod eccentricity;
 pub mod friction;
+pub mod nip;
 pub mod rk4;
 pub mod roll;
 pub mod sensors;
 pub mod span;
 pub mod windup;
 
-use crate::exchange::{Actuators, Brakes, Measurements};
+use crate::exchange::{Actuators, Brakes, BySection, Measurements};
 use crate::machine::{Machine, MachineError};
 use crate::real::{Real, Sum};
-use friction::{Delay, Friction};
+use eccentricity::{Eccentricity, Offsets};
+use friction::{Brake, Delay, Law};
+use nip::Nips;
 use rk4::{Rk4, State};
 use roll::{Idle, Unwind};
 use sensors::{Sensors, Sight};
 use span::{Spans, Web};
-use windup::Windup;
+use windup::{FRONT, Holding, Nip, ROLLS, ShippingRoll, Speeds, Traction, Windup};
 
 /// Period of the plant task and step of its integration, ms.
 pub const PLANT_PERIOD_MS: u32 = 4;
@@ -40,46 +44,61 @@ pub struct Winder<R: Real, const SPANS: usize> {
     threaded: bool,
     delay: Brakes<Delay>,
     closed: Brakes<bool>,
+    nips: [Nip<R>; ROLLS],
+    winding: Winding<R>,
+    eccentricity: Eccentricity<R, SPANS>,
     sensors: Sensors<R>,
 }
 
-#[derive(Clone, Copy, Debug)]
+/// How the shipping roll is being wound: ground truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Winding<R> {
+    /// Forces of the nips on the shipping roll, N: rear drum, front drum, rider roll.
+    pub nip_force: [R; ROLLS],
+    /// Loads of the nips per width, N/m; zero where neither slip nor layers that compress are computed.
+    pub nip_load: [R; ROLLS],
+    /// Nips that slide.
+    pub slides: [bool; ROLLS],
+    /// Wound-on tension per width, N/m.
+    pub wound_on_tension: R,
+    /// The wound-on tension has been above the web's strength since the core was put in: the roll has burst.
+    pub burst: bool,
+}
+
+#[derive(Clone, Debug)]
 struct Coefficients<R, const SPANS: usize> {
     spans: Spans<R, SPANS>,
     /// The roll at the end of each span but the last, where the windup is.
     idle: [Option<Idle<R>>; SPANS],
     unwind: Unwind<R>,
     windup: Windup<R>,
+    nips: Nips<R>,
+    /// The rolls of the windup may slip.
+    slips: bool,
     rk4: Rk4<R>,
-    /// 1/h, 1/s.
-    per_step: R,
-    /// Torque of the unwind's brake, N·m; forces of the drums' brakes at their surface, N.
-    brakes: Brakes<R>,
-    /// Tension at which the web breaks, N.
+    /// Brakes as they are when closed: a torque on the unwind, forces at the drums' surfaces.
+    brakes: Brakes<Brake<R>>,
+    /// Half width of the stiction band at the surface, m/s, where the paper's brake model is wanted.
+    karnopp: Option<R>,
+    /// Tension at which the web breaks, N, and per width, N/m.
     strength: R,
+    strength_per_width: R,
     core_radius: R,
     full_radius: R,
     expire_radius: R,
     threaded_strain: R,
 }
 
-/// What drives the two bodies that have motors, constant over a step.
+/// What drives the winder, constant over a step.
 #[derive(Clone, Copy)]
 struct Load<R> {
-    /// Torque on the parent roll, N·m.
+    /// Torque on the parent roll less its brake's, N·m.
     uw: R,
-    /// Force on the surface of the windup, N.
-    wu: R,
-}
-
-/// The two bodies that have motors and brakes, at one instant.
-struct Bodies<R> {
-    /// Inertia of the parent roll, kg·m², and all torques on it, N·m.
-    uw: (R, R),
-    /// Mass of the windup at its surface, kg, and all forces on it, N.
-    wu: (R, R),
-    /// Ṙ_wu, m/s.
-    r_wu_rate: R,
+    /// On the windup.
+    windup: windup::Load<R>,
+    /// Speed of the layer that is wound, of the web's: z_eff/z; zero without web.
+    layer: R,
+    threaded: bool,
 }
 
 impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
@@ -99,35 +118,13 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
                 high: rolls,
             });
         }
-        let roll = |i: usize| machine.idle.get(i);
-        let (web, brakes) = (&machine.web, &machine.brakes);
-        let coefficients = Coefficients {
-            spans: Spans::new(
-                core::array::from_fn(|i| roll(i).map_or(machine.last_span_m, |r| r.span_m)),
-                web.stiffness_n_m * web.width_m,
-                web.retardation_s,
-            ),
-            idle: core::array::from_fn(|i| roll(i).map(Idle::new)),
-            unwind: Unwind::new(machine),
-            windup: Windup::new(machine),
-            rk4: Rk4::new(h),
-            per_step: R::of(1.0 / h),
-            brakes: Brakes {
-                uw: R::of(brakes.uw_n_m),
-                rd: R::of(brakes.rd_n_m / machine.rear_drum.radius_m),
-                fd: R::of(brakes.fd_n_m / machine.front_drum.radius_m),
-            },
-            strength: R::of(web.strength_n_m * web.width_m),
-            core_radius: R::of(machine.shipping_roll.core_radius_m),
-            full_radius: R::of(machine.parent_roll.full_radius_m),
-            expire_radius: R::of(machine.parent_roll.expire_radius_m),
-            threaded_strain: R::of(THREADED_STRAIN),
-        };
+        let coefficients = Coefficients::new(machine, h);
         let zero = R::Sum::at(R::ZERO);
         Ok(Self {
             state: State {
                 strain: [zero; SPANS],
                 v: [zero; SPANS],
+                windup: [zero; 3],
                 omega_uw: zero,
                 r_uw: R::Sum::at(coefficients.full_radius),
                 r_wu: R::Sum::at(coefficients.core_radius),
@@ -135,8 +132,11 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
             },
             web: Web::NONE,
             threaded: false,
-            delay: Brakes::all(Delay::new(brakes.delay_s, h)),
+            delay: Brakes::all(Delay::new(machine.brakes.delay_s, h)),
             closed: Brakes::default(),
+            nips: [Nip::Sticks; ROLLS],
+            winding: Winding::default(),
+            eccentricity: Eccentricity::new(machine, h),
             sensors: Sensors::new(machine, h),
             coefficients,
         })
@@ -172,17 +172,26 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         self.state.map(|sum| sum.value())
     }
 
-    /// Puts the machine into a state; the web stays threaded or not.
+    /// Puts the machine into a state; the web stays threaded or not. Where the windup cannot slip, all of it
+    /// takes the speed of the rear drum.
     pub fn set_state(&mut self, state: &State<R, SPANS>) {
         self.state = state.map(R::Sum::at);
+        if !self.coefficients.slips {
+            self.state.windup = [self.state.v[SPANS - 1]; 3];
+        }
         if self.threaded {
-            self.web = self.coefficients.web(state);
+            self.web = self.coefficients.web(state, &Offsets::NONE);
         }
     }
 
     /// Tensions of the spans, N: ground truth.
     pub fn tension(&self) -> [R; SPANS] {
         self.web.tension
+    }
+
+    /// How the shipping roll is being wound: ground truth.
+    pub fn winding(&self) -> &Winding<R> {
+        &self.winding
     }
 
     /// The web is led through the machine and whole.
@@ -194,6 +203,7 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         let (c, handling) = (&self.coefficients, actuators.handling);
         if handling.new_core {
             self.state.r_wu = R::Sum::at(c.core_radius);
+            self.winding.burst = false;
         }
         if handling.new_parent_roll {
             self.state.r_uw = R::Sum::at(c.full_radius);
@@ -206,64 +216,133 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
     fn thread_with(&mut self, strain: R) {
         self.threaded = true;
         self.state.strain = [R::Sum::at(strain); SPANS];
-        self.web = self.coefficients.web(&self.state());
+        self.web = self.coefficients.web(&self.state(), &Offsets::NONE);
     }
 
-    /// Moves everything by h, the friction of the brakes held as the step found it.
+    /// Moves everything by h, the friction of brakes and nips as the step found it.
     fn advance(&mut self, actuators: &Actuators<R>) {
-        let c = &self.coefficients;
         self.state.travel = R::Sum::at(R::ZERO);
         let x = self.state.map(|sum| sum.value());
-        let torque = &actuators.torque;
-        let mut load = Load {
-            uw: torque.uw,
-            wu: c.windup.force([torque.rd, torque.fd, torque.rr]),
+        let offsets = self.eccentricity.turn(&x);
+        if self.threaded && self.eccentricity.present() {
+            self.web = self.coefficients.web(&x, &offsets);
+        }
+        let traction = self.load_nips(x.r_wu);
+        let c = &self.coefficients;
+        let layer = if self.threaded {
+            c.nips.thickness(self.winding.wound_on_tension)
+        } else {
+            R::ZERO
         };
-        let friction = self.friction(&x, &load);
-        load.uw -= friction.uw.lambda;
-        load.wu -= friction.wu.lambda;
+        let roll = c.windup.shipping_roll(x.r_wu, x.v[SPANS - 1] * layer);
+        let mut holding = self.hold_windup(&actuators.torque, &x, &roll, traction.as_ref());
+        let brake_uw = c.brake_uw(self.closed.uw, x.r_uw);
+        let inertia = c.unwind.inertia(x.r_uw);
+        let v_uw = x.omega_uw * x.r_uw;
+        let free = c
+            .unwind
+            .torque(actuators.torque.uw, self.web.tension[0], v_uw, x.r_uw);
+        let unwind = brake_uw.hold(inertia, x.omega_uw, free);
+        let load = Load {
+            uw: actuators.torque.uw - unwind.lambda,
+            windup: holding.load,
+            layer,
+            threaded: self.threaded,
+        };
 
-        let k1 = c.rates(&x, &self.web, self.threaded, &load);
-        let threaded = self.threaded;
+        let k1 = c.rates(&x, &self.web, &load);
         c.rk4.step(&mut self.state, k1, |x| {
-            let web = if threaded { c.web(x) } else { Web::NONE };
-            c.rates(x, &web, threaded, &load)
+            let web = if load.threaded {
+                c.web(x, &offsets)
+            } else {
+                Web::NONE
+            };
+            c.rates(x, &web, &load)
         });
 
-        if friction.uw.sticks {
+        if unwind.sticks {
             self.state.omega_uw = R::Sum::at(R::ZERO);
         }
-        if friction.wu.sticks {
-            self.state.v[SPANS - 1] = R::Sum::at(R::ZERO);
+        self.settle_windup(&roll, &mut holding);
+        if self.threaded {
+            self.web = self.coefficients.web(&self.state(), &offsets);
         }
-        if threaded {
-            self.web = c.web(&self.state.map(|sum| sum.value()));
-        }
+        self.look_at_winding(&holding);
     }
 
-    fn friction(&self, x: &State<R, SPANS>, load: &Load<R>) -> BrakeFriction<R> {
-        let (c, closed) = (&self.coefficients, &self.closed);
-        if !(closed.uw || closed.rd || closed.fd) {
-            return BrakeFriction::NONE;
+    /// What the nips can carry in this step, where they may let go; what slides is pulled with that.
+    fn load_nips(&mut self, r_wu: R) -> Option<Traction<R>> {
+        let c = &self.coefficients;
+        if c.slips || c.nips.compress() {
+            self.winding.nip_load = c.nips.loads(r_wu);
         }
-        let of = |closed, brake| if closed { brake } else { R::ZERO };
-        let bodies = c.bodies(x, &self.web, self.threaded, load);
-        let (inertia, torque) = bodies.uw;
-        let (mass, force) = bodies.wu;
-        BrakeFriction {
-            uw: Friction::of(
-                inertia * x.omega_uw,
-                torque,
-                of(closed.uw, c.brakes.uw),
-                c.per_step,
-            ),
-            wu: Friction::of(
-                mass * x.v[SPANS - 1],
-                force,
-                of(closed.rd, c.brakes.rd) + of(closed.fd, c.brakes.fd),
-                c.per_step,
-            ),
+        if !c.slips {
+            return None;
         }
+        let sliding = c.nips.traction(&self.winding.nip_load);
+        for (nip, pull) in self.nips.iter_mut().zip(sliding) {
+            if let Nip::Slides(force) = nip {
+                *force = if *force < R::ZERO { -pull } else { pull };
+            }
+        }
+        Some(Traction {
+            sticking: c.nips.static_traction(&self.winding.nip_load),
+            sliding,
+        })
+    }
+
+    /// How nips and brakes of the windup hold over the step that starts at `x`.
+    fn hold_windup(
+        &self,
+        torque: &BySection<R>,
+        x: &State<R, SPANS>,
+        roll: &ShippingRoll<R>,
+        traction: Option<&Traction<R>>,
+    ) -> Holding<R> {
+        let c = &self.coefficients;
+        let brakes = [
+            c.brakes.rd.when(self.closed.rd),
+            c.brakes.fd.when(self.closed.fd),
+            Brake::NONE,
+        ];
+        let load = windup::Load {
+            drive: c.windup.drive(torque),
+            nips: self.nips,
+        };
+        let t_sr = self.web.tension[SPANS - 1];
+        c.windup
+            .hold(&x.speeds(), roll, t_sr, load, &brakes, traction)
+    }
+
+    fn settle_windup(&mut self, roll: &ShippingRoll<R>, holding: &mut Holding<R>) {
+        let moved = self.state().speeds();
+        let mut settled = moved;
+        self.coefficients.windup.settle(&mut settled, roll, holding);
+        self.nips = holding.load.nips;
+        // only what has been changed loses what its sum carries
+        let put = |sum: &mut R::Sum, from: R, to: R| {
+            if from != to {
+                *sum = R::Sum::at(to);
+            }
+        };
+        let [rd, fd, rr] = settled.rolls;
+        put(&mut self.state.v[SPANS - 1], moved.rolls[0], rd);
+        put(&mut self.state.windup[0], moved.rolls[1], fd);
+        put(&mut self.state.windup[1], moved.rolls[2], rr);
+        put(&mut self.state.windup[2], moved.wu, settled.wu);
+    }
+
+    fn look_at_winding(&mut self, holding: &Holding<R>) {
+        let c = &self.coefficients;
+        let (t_sr, front) = (self.web.tension[SPANS - 1], holding.nip_force[FRONT]);
+        let tight = c.nips.wound_on_tension(&self.winding.nip_load, t_sr, front);
+        self.winding = Winding {
+            nip_force: holding.nip_force,
+            nip_load: self.winding.nip_load,
+            slides: self.nips.map(|nip| nip != Nip::Sticks),
+            wound_on_tension: tight,
+            burst: self.winding.burst || tight > c.strength_per_width,
+        };
     }
 
     fn break_web_if_due(&mut self) {
@@ -279,7 +358,7 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         let x = self.state();
         let sight = Sight {
             omega_uw: x.omega_uw,
-            v_rd: x.v[SPANS - 1],
+            v: x.speeds().rolls,
             travel: x.travel,
             r_wu: x.r_wu,
         };
@@ -290,77 +369,96 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
     }
 }
 
-/// Friction of the unwind's brake, N·m, and of the drums' brakes at their surface, N.
-struct BrakeFriction<R> {
-    uw: Friction<R>,
-    wu: Friction<R>,
-}
-
-impl<R: Real> BrakeFriction<R> {
-    const NONE: Self = Self {
-        uw: Friction::NONE,
-        wu: Friction::NONE,
-    };
+impl<T: Copy, const SPANS: usize> State<T, SPANS> {
+    /// The speeds of the windup.
+    pub fn speeds(&self) -> Speeds<T> {
+        let [fd, rr, wu] = self.windup;
+        Speeds {
+            rolls: [self.v[SPANS - 1], fd, rr],
+            wu,
+        }
+    }
 }
 
 impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
-    #[inline(always)]
-    fn web(&self, x: &State<R, SPANS>) -> Web<R, SPANS> {
-        self.spans.web(x.omega_uw * x.r_uw, &x.v, &x.strain)
-    }
-
-    #[inline(always)]
-    fn bodies(
-        &self,
-        x: &State<R, SPANS>,
-        web: &Web<R, SPANS>,
-        threaded: bool,
-        load: &Load<R>,
-    ) -> Bodies<R> {
-        let (v, t) = (x.v[SPANS - 1], web.tension[SPANS - 1]);
-        let roll = self.windup.shipping_roll(x.r_wu);
-        // without web the roll neither grows nor is pushed by the paper that arrives
-        let r_wu_rate = if threaded {
-            self.windup.radius_rate(&roll, v)
-        } else {
-            R::ZERO
+    fn new(machine: &Machine, h: f64) -> Self {
+        let roll = |i: usize| machine.idle.get(i);
+        let (web, brakes) = (&machine.web, &machine.brakes);
+        let law = Law::SetValued {
+            per_step: R::of(1.0 / h),
         };
-        let torque = self
-            .unwind
-            .torque(load.uw, web.tension[0], x.omega_uw * x.r_uw, x.r_uw);
-        Bodies {
-            uw: (self.unwind.inertia(x.r_uw), torque),
-            wu: (
-                self.windup.mass(&roll),
-                self.windup.resultant(&roll, load.wu, t, v, r_wu_rate),
+        let brake = |force: f64| Brake::closed(R::of(force), R::of(brakes.static_ratio), law);
+        let mut coefficients = Self {
+            spans: Spans::new(
+                core::array::from_fn(|i| roll(i).map_or(machine.last_span_m, |r| r.span_m)),
+                web.stiffness_n_m * web.width_m,
+                web.retardation_s,
             ),
-            r_wu_rate,
+            idle: core::array::from_fn(|i| roll(i).map(Idle::new)),
+            unwind: Unwind::new(machine),
+            windup: Windup::new(machine),
+            nips: Nips::new(machine),
+            slips: machine.nips.slip,
+            rk4: Rk4::new(h),
+            brakes: Brakes {
+                uw: brake(brakes.uw_n_m),
+                rd: brake(brakes.rd_n_m / machine.rear_drum.radius_m),
+                fd: brake(brakes.fd_n_m / machine.front_drum.radius_m),
+            },
+            karnopp: (brakes.karnopp_m_s > 0.0).then(|| R::of(brakes.karnopp_m_s)),
+            strength: R::of(web.strength_n_m * web.width_m),
+            strength_per_width: R::of(web.strength_n_m),
+            core_radius: R::of(machine.shipping_roll.core_radius_m),
+            full_radius: R::of(machine.parent_roll.full_radius_m),
+            expire_radius: R::of(machine.parent_roll.expire_radius_m),
+            threaded_strain: R::of(THREADED_STRAIN),
+        };
+        if let Some(band) = coefficients.karnopp {
+            coefficients.brakes.rd = coefficients.brakes.rd.following(Law::Karnopp { band });
+            coefficients.brakes.fd = coefficients.brakes.fd.following(Law::Karnopp { band });
         }
+        coefficients
+    }
+
+    /// The unwind's brake at a radius: the stiction band is one of the surface.
+    fn brake_uw(&self, closed: bool, r: R) -> Brake<R> {
+        let brake = match self.karnopp {
+            Some(band) => self.brakes.uw.following(Law::Karnopp { band: band / r }),
+            None => self.brakes.uw,
+        };
+        brake.when(closed)
     }
 
     #[inline(always)]
-    fn rates(
-        &self,
-        x: &State<R, SPANS>,
-        web: &Web<R, SPANS>,
-        threaded: bool,
-        load: &Load<R>,
-    ) -> State<R, SPANS> {
-        let bodies = self.bodies(x, web, threaded, load);
+    fn web(&self, x: &State<R, SPANS>, offsets: &Offsets<R, SPANS>) -> Web<R, SPANS> {
+        let v_uw = x.omega_uw * x.r_uw;
+        self.spans
+            .web(v_uw + offsets.uw, &offsets.added_to(&x.v), &x.strain)
+    }
+
+    #[inline(always)]
+    fn rates(&self, x: &State<R, SPANS>, web: &Web<R, SPANS>, load: &Load<R>) -> State<R, SPANS> {
+        let (v_rd, t_sr) = (x.v[SPANS - 1], web.tension[SPANS - 1]);
+        let roll = self.windup.shipping_roll(x.r_wu, v_rd * load.layer);
+        let windup = self.windup.rates(&x.speeds(), &roll, t_sr, &load.windup);
+        let v_uw = x.omega_uw * x.r_uw;
+        let torque = self.unwind.torque(load.uw, web.tension[0], v_uw, x.r_uw);
+        let [rd, fd, rr] = windup.rolls;
         State {
             strain: web.strain_rate,
             v: core::array::from_fn(|i| match &self.idle[i] {
                 Some(idle) => idle.acceleration(x.v[i], web.tension[i], web.tension[i + 1]),
-                None => bodies.wu.1 / bodies.wu.0,
+                None => rd,
             }),
-            omega_uw: bodies.uw.1 / bodies.uw.0,
-            r_uw: if threaded {
+            windup: [fd, rr, windup.wu],
+            omega_uw: torque / self.unwind.inertia(x.r_uw),
+            r_uw: if load.threaded {
                 self.unwind.radius_rate(x.omega_uw)
             } else {
                 R::ZERO
             },
-            r_wu: bodies.r_wu_rate,
-            travel: x.v[SPANS - 1],
+            r_wu: roll.radius_rate,
+            travel: v_rd,
         }
     }
 }

@@ -11,15 +11,17 @@ use crate::real::{Real, Sum};
 pub struct State<T, const SPANS: usize> {
     /// Strain of the spans ε, from the unwind on.
     pub strain: [T; SPANS],
-    /// Surface speed of the roll at the end of each span, m/s; the last one is the windup's, V_rd.
+    /// Surface speed of the roll at the end of each span, m/s; the last one is the rear drum's, V_rd.
     pub v: [T; SPANS],
+    /// Surface speeds of the other rolls of the windup, m/s: front drum, rider roll, shipping roll.
+    pub windup: [T; 3],
     /// Angular velocity of the parent roll, rad/s.
     pub omega_uw: T,
     /// Radius of the parent roll, m.
     pub r_uw: T,
     /// Radius of the shipping roll, m.
     pub r_wu: T,
-    /// Way of the windup's surface, m.
+    /// Way of the rear drum's surface, m.
     pub travel: T,
 }
 
@@ -30,6 +32,7 @@ impl<T: Copy, const SPANS: usize> State<T, SPANS> {
         State {
             strain: self.strain.map(&mut f),
             v: self.v.map(&mut f),
+            windup: self.windup.map(&mut f),
             omega_uw: f(self.omega_uw),
             r_uw: f(self.r_uw),
             r_wu: f(self.r_wu),
@@ -47,6 +50,7 @@ impl<T: Copy, const SPANS: usize> State<T, SPANS> {
         State {
             strain: core::array::from_fn(|i| f(self.strain[i], other.strain[i])),
             v: core::array::from_fn(|i| f(self.v[i], other.v[i])),
+            windup: core::array::from_fn(|i| f(self.windup[i], other.windup[i])),
             omega_uw: f(self.omega_uw, other.omega_uw),
             r_uw: f(self.r_uw, other.r_uw),
             r_wu: f(self.r_wu, other.r_wu),
@@ -57,7 +61,8 @@ impl<T: Copy, const SPANS: usize> State<T, SPANS> {
     /// Every variable in a fixed order.
     pub fn iter(&self) -> impl Iterator<Item = T> {
         let rest = [self.omega_uw, self.r_uw, self.r_wu, self.travel];
-        self.strain.into_iter().chain(self.v).chain(rest)
+        let speeds = self.v.into_iter().chain(self.windup);
+        self.strain.into_iter().chain(speeds).chain(rest)
     }
 }
 

@@ -15,7 +15,12 @@ struct Coefficients<R> {
     per_radius: BySection<R>,
     /// Encoder pulses for a metre of surface, 1/m.
     pulses: R,
-    load_cell_span: usize,
+    /// The roll on the load cells, and the shares of the tension before and after it.
+    load_cell_roll: usize,
+    before: R,
+    after: R,
+    /// What the amplifier shows without web, N.
+    zero: R,
 }
 
 /// Load cells, encoders and the position sensor of the rider-roll beam.
@@ -32,8 +37,8 @@ pub struct Sensors<R> {
 pub struct Sight<R> {
     /// Angular velocity of the parent roll, rad/s.
     pub omega_uw: R,
-    /// Surface speed of the windup, m/s.
-    pub v_rd: R,
+    /// Surface speeds of rear drum, front drum and rider roll, m/s.
+    pub v: [R; 3],
     /// Way of the rear drum's surface since the last look, m.
     pub travel: R,
     /// Radius of the shipping roll, m.
@@ -44,6 +49,10 @@ impl<R: Real> Sensors<R> {
     /// The sensors of a machine, looked at every `h` seconds.
     pub fn new(machine: &Machine, h: f64) -> Self {
         let per_radius = |roll: &DrivenRoll| R::of(1.0 / roll.radius_m);
+        let cells = &machine.load_cells;
+        let sine = |wrap: f64| libm::sin(0.5 * wrap);
+        let gain = sine(cells.wrap_rad) / sine(cells.calibrated_wrap_rad);
+        let before = if cells.both_spans { 0.5 } else { 0.0 };
         let circumference = core::f64::consts::TAU * machine.rear_drum.radius_m;
         Self {
             coefficients: Coefficients {
@@ -55,7 +64,10 @@ impl<R: Real> Sensors<R> {
                     rr: per_radius(&machine.rider_roll),
                 },
                 pulses: R::of(machine.encoder_pulses / circumference),
-                load_cell_span: machine.load_cells.roll + 1,
+                load_cell_roll: cells.roll,
+                before: R::of(gain * before),
+                after: R::of(gain * (1.0 - before)),
+                zero: R::of(0.5 * cells.tare_n / sine(cells.calibrated_wrap_rad)),
             },
             tension: R::ZERO,
             count: 0,
@@ -64,24 +76,29 @@ impl<R: Real> Sensors<R> {
     }
 
     /// One look, every step of the plant.
+    ///
+    /// The load cells carry F = (t_before + t_after)·sin(β/2) + tare and show F/(2·sin(β_cal/2)), filtered.
     pub fn look<const SPANS: usize>(
         &mut self,
         sight: &Sight<R>,
         tension: &[R; SPANS],
     ) -> Measurements<R> {
         let c = &self.coefficients;
-        self.tension += c.filter * (tension[c.load_cell_span] - self.tension);
+        let shown = c.before * tension[c.load_cell_roll] + c.after * tension[c.load_cell_roll + 1];
+        self.tension += c.filter * (shown + c.zero - self.tension);
 
         let way = self.fraction + sight.travel * c.pulses;
         let whole = way.floor_i32();
         self.count = self.count.wrapping_add_signed(whole);
         self.fraction = way - R::of_i32(whole);
 
-        let omega = c.per_radius.map(|per_radius| sight.v_rd * per_radius);
+        let [rd, fd, rr] = sight.v;
         Measurements {
             omega: BySection {
                 uw: sight.omega_uw,
-                ..omega
+                rd: rd * c.per_radius.rd,
+                fd: fd * c.per_radius.fd,
+                rr: rr * c.per_radius.rr,
             },
             tension: self.tension,
             d_wu: sight.r_wu + sight.r_wu,
