@@ -190,6 +190,29 @@ mod pi {
     }
 }
 
+mod motor {
+    use super::*;
+    use model_core::drive::motor::Motor;
+
+    /// 20.5 kN·m up to 500 kW at 24.4 rad/s, then constant power; in both directions, 150 % for a while.
+    #[test]
+    fn torque_is_limited_by_rated_torque_and_rated_power() {
+        let motor = Motor::<f64>::new(&Machine::news_8000().motors.uw);
+        for (omega, share, limit) in [
+            (0.0, 1.0, 20.5e3),
+            (24.3, 1.0, 20.5e3),
+            (24.4, 1.0, 500e3 / 24.4),
+            (50.0, 1.0, 10e3),
+            (-50.0, 1.0, 10e3),
+            (50.0, 1.5, 15e3),
+            (0.0, 1.5, 30.75e3),
+            (10.0, 0.0, 0.0),
+        ] {
+            near("torque", motor.limit(omega, share), limit, 1e-9 * limit);
+        }
+    }
+}
+
 mod diameter {
     use super::*;
 
@@ -261,8 +284,10 @@ mod closed_loop {
     }
 
     impl Band {
+        /// The speed, too, follows its reference.
         fn look<R: Real>(&mut self, o: &Operator<R>) {
             let status = o.simulator.status();
+            near("speed", status.v.to_f64(), status.v_ref.to_f64(), 0.003);
             let measured = o.value(&image::TENSION) * o.machine.web.width_m;
             let error = measured / status.tension_ref.to_f64() - 1.0;
             self.low = self.low.min(error);
