@@ -74,11 +74,15 @@ impl Log {
         self.kept().iter().cloned().collect()
     }
 
-    /// The last lines, for an error's message.
+    /// The last lines for everyone, for an error's message.
     pub fn last(&self, count: usize) -> String {
         let lines = self.kept();
-        let last = lines.iter().skip(lines.len().saturating_sub(count));
-        last.map(|line| format!("\n  {line}")).collect()
+        let lines = lines.iter().rev().filter(|line| line.level >= Level::Info);
+        let last: Vec<_> = lines
+            .take(count)
+            .map(|line| format!("\n  {line}"))
+            .collect();
+        last.into_iter().rev().collect()
     }
 
     fn kept(&self) -> MutexGuard<'_, VecDeque<Line>> {

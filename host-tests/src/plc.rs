@@ -16,13 +16,27 @@ use anyhow::{Result, bail};
 use model_core::image::{self, Commands, Feedback, Kind, Signal};
 use model_core::logic::{Fault, Mode, Refusal, command, status};
 use model_core::machine::Machine;
+use model_core::plant::PLANT_PERIOD_MS;
 use model_core::profidrive::{stw1, zsw1};
 
 use crate::interrupt;
 use crate::link::Link;
 
-/// Plant step, s: what one count of `plant_ticks` is.
-const PLANT_PERIOD_S: f64 = 0.004;
+/// Control word 1 of every drive.
+const STW1: [&Signal; 4] = [
+    &image::STW1_UW,
+    &image::STW1_RD,
+    &image::STW1_FD,
+    &image::STW1_RR,
+];
+/// Status word 1 of every drive.
+const ZSW1: [&Signal; 4] = [
+    &image::ZSW1_UW,
+    &image::ZSW1_RD,
+    &image::ZSW1_FD,
+    &image::ZSW1_RR,
+];
+
 /// Time of a program cycle, s of simulated time; usual for a winder PLC.
 pub const CYCLE_S: f64 = 0.040;
 /// A step stands at least this long, s: its commands have arrived and their effect is in the feedback.
@@ -271,12 +285,7 @@ impl fmt::Display for Trouble {
             };
             write!(f, "{} {word}: {text}; ", signal.name)?;
         }
-        for signal in [
-            &image::ZSW1_UW,
-            &image::ZSW1_RD,
-            &image::ZSW1_FD,
-            &image::ZSW1_RR,
-        ] {
+        for signal in ZSW1 {
             write!(f, "{} {:04X} hex, ", signal.name, s.feedback.word(signal))?;
         }
         write!(f, "{}", image::WINDER_STATUS.name)?;
@@ -346,7 +355,7 @@ impl Plc {
         let ticks = feedback.double(&image::PLANT_TICKS);
         let first = *self.first_tick.get_or_insert(ticks);
         let sample = Sample {
-            t_s: f64::from(ticks.wrapping_sub(first)) * PLANT_PERIOD_S,
+            t_s: 1e-3 * f64::from(PLANT_PERIOD_MS) * f64::from(ticks.wrapping_sub(first)),
             step: self.step,
             feedback: *feedback,
         };
@@ -368,12 +377,7 @@ impl Plc {
         self.commands.set_word(&image::HEARTBEAT_PLC, heartbeat);
         self.commands
             .set_word(&image::WINDER_COMMAND, self.step.winder_command());
-        for word in [
-            &image::STW1_UW,
-            &image::STW1_RD,
-            &image::STW1_FD,
-            &image::STW1_RR,
-        ] {
+        for word in STW1 {
             self.commands.set_word(word, self.step.stw1());
         }
         Ok(sample)
@@ -383,14 +387,8 @@ impl Plc {
     fn finished(&self, sample: &Sample) -> bool {
         let is = |bits| sample.feedback.word(&image::WINDER_STATUS) & bits == bits;
         let drives = |bits| {
-            [
-                image::ZSW1_UW,
-                image::ZSW1_RD,
-                image::ZSW1_FD,
-                image::ZSW1_RR,
-            ]
-            .iter()
-            .all(|zsw1| sample.feedback.word(zsw1) & bits == bits)
+            ZSW1.iter()
+                .all(|zsw1| sample.feedback.word(zsw1) & bits == bits)
         };
         let near = |signal, value_mm: f64| (sample.value(signal) - value_mm).abs() < 1.0;
         match self.step {

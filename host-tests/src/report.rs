@@ -235,3 +235,63 @@ pub fn minutes(t_s: f64) -> String {
     let t_s = t_s.round() as u64;
     format!("{}:{:02} min", t_s / 60, t_s % 60)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plc::Step;
+    use model_core::image::Feedback;
+    use model_core::machine::Machine;
+
+    /// Samples of one mode: acceleration, tension over reference, diameter.
+    fn report(seen: &[(Mode, f64, f64, f64)]) -> Report {
+        let recipe = Recipe {
+            machine: Machine::news_8000(),
+            diameter_m: 0.40,
+            speed_m_s: 20.0,
+        };
+        let sample = |&(mode, a_ref, tension, diameter): &(Mode, f64, f64, f64)| {
+            let mut feedback = Feedback::default();
+            feedback.set_word(&image::MODE, mode as u16);
+            feedback.set(&image::V_WEB, 600.0);
+            feedback.set(&image::A_REF, a_ref);
+            feedback.set(&image::TENSION_REF, 300.0);
+            feedback.set(&image::TENSION, 300.0 * tension);
+            feedback.set(&image::D_WU, diameter);
+            Sample {
+                t_s: 0.0,
+                step: Step::Run,
+                feedback,
+            }
+        };
+        Report::of(&recipe, &seen.iter().map(sample).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_limit_is_missed_by_what_lies_beyond_it() {
+        use Mode::{NormalStop, Run};
+        let good = [(Run, 0.45, 0.91, 300.0), (NormalStop, -0.45, 1.09, 401.9)];
+        assert!(report(&good).missed().is_empty());
+        for (i, bad, missed) in [
+            (0, (Run, 0.45, 0.89, 300.0), "tension in acceleration"),
+            (
+                1,
+                (NormalStop, -0.45, 1.11, 401.9),
+                "tension in deceleration",
+            ),
+            (1, (NormalStop, -0.45, 1.09, 402.1), "diameter of the roll"),
+            // what has not been seen has not been kept
+            (0, (Run, 0.0, 1.0, 300.0), "tension in acceleration"),
+        ] {
+            let mut seen = good;
+            seen[i] = bad;
+            assert_eq!(report(&seen).missed(), [missed]);
+        }
+    }
+
+    #[test]
+    fn times_are_for_people() {
+        assert_eq!(minutes(59.6), "1:00 min");
+        assert_eq!(minutes(614.0), "10:14 min");
+    }
+}

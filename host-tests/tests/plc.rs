@@ -7,10 +7,20 @@ use model_core::image::{self, Commands, Feedback, Image};
 use model_core::machine::Machine;
 use model_core::simulator::Simulator;
 
+type Winder = Simulator<f32, 3>;
+
 /// Winds a set on a NEWS-8000; what the PLC saw, or what it complained about.
 fn wind(recipe: &Recipe) -> Result<Vec<Sample>, Trouble> {
+    wind_with(recipe, |_, _| ())
+}
+
+/// As [`wind`], with something that befalls the winder.
+fn wind_with(
+    recipe: &Recipe,
+    mut accident: impl FnMut(&mut Winder, &Sample),
+) -> Result<Vec<Sample>, Trouble> {
     let machine = Machine::news_8000();
-    let mut simulator = Simulator::<f32, 3>::new(&machine).expect("a valid machine");
+    let mut simulator = Winder::new(&machine).expect("a valid machine");
     let mut image = Image {
         commands: Commands::of(&machine),
         feedback: Feedback::default(),
@@ -21,8 +31,10 @@ fn wind(recipe: &Recipe) -> Result<Vec<Sample>, Trouble> {
         for _ in 0..(1e3 * CYCLE_S) as u32 / DRIVE_PERIOD_MS {
             simulator.drive_cycle(&mut image);
         }
-        samples.push(plc.cycle(&image.feedback)?);
+        let sample = plc.cycle(&image.feedback)?;
         image.commands = *plc.commands();
+        accident(&mut simulator, &sample);
+        samples.push(sample);
     }
     Ok(samples)
 }
@@ -71,6 +83,21 @@ fn a_refusal_ends_the_set_and_names_step_reason_and_state() {
     ] {
         assert!(trouble.contains(part), "{trouble:?} lacks {part:?}");
     }
+}
+
+#[test]
+fn a_web_break_ends_the_set() {
+    let trouble = wind_with(&recipe(0.40, 1200.0), |winder, sample| {
+        if sample.value(&image::D_WU) > 200.0 {
+            winder.plant.winder_mut().break_web();
+        }
+    });
+    let trouble = trouble.unwrap_err().to_string();
+    assert!(
+        trouble.starts_with("the drives report fault 2: web break (step \"run\""),
+        "{trouble}"
+    );
+    assert!(trouble.contains("mode 8: web-break stop"), "{trouble}");
 }
 
 #[test]

@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 use host_tests::command::{demo, run, signals, test};
 use host_tests::interrupt::{self, Interrupted};
+use host_tests::plant;
 
 /// A winder for a PLC to control: unwind, web, drums, shipping roll and their electric drives, simulated in real
 /// time on a microcontroller, in QEMU or on this PC.
@@ -28,6 +29,8 @@ enum Command {
     Run(run::Args),
     /// Install what is missing and run every test, on the host and in QEMU
     Test,
+    /// Run the winder alone, open loop, from a schedule of torques
+    Plant(plant::Options),
     /// Print the signal list as CSV
     Signals,
 }
@@ -47,14 +50,15 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<ExitCode> {
-    if matches!(cli.command, Command::Signals) {
-        return signals::main();
-    }
-    interrupt::install()?;
     match cli.command {
-        Command::Demo(args) => demo::main(&args),
-        Command::Run(args) => run::main(args),
-        Command::Test => test::main(),
         Command::Signals => signals::main(),
+        Command::Plant(options) => {
+            plant::run(&options, &mut std::io::stdout().lock())?;
+            Ok(ExitCode::SUCCESS)
+        }
+        // the others start processes, which must end with this one
+        Command::Demo(args) => interrupt::install().and_then(|()| demo::main(&args)),
+        Command::Run(args) => interrupt::install().and_then(|()| run::main(args)),
+        Command::Test => interrupt::install().and_then(|()| test::main()),
     }
 }

@@ -24,12 +24,15 @@ struct Coefficients<R> {
     r_rd: R,
     r_fd: R,
     r_rr: R,
-    /// Mass of drums, rider roll and the idle rolls after the load cells at the surface, kg.
+    /// Mass of drums and rider roll at the surface, kg.
     drum_mass: R,
     /// ½·π·ρ·W/4: mass of the shipping roll for each m² of its diameter squared.
     roll_mass: R,
-    /// Friction of all these and of the shipping roll at the surface, N·s/m.
+    /// Friction of all rolls at the surface, N·s/m.
     friction: R,
+    /// Mass and friction of the idle rolls after the load cells, at the surface.
+    path_mass: R,
+    path_friction: R,
     rider_mass: R,
     rider_friction: R,
     /// Gains of the speed loop for 1 kg.
@@ -59,10 +62,8 @@ impl<R: Real> Drums<R> {
     /// that it does not work against the web.
     pub fn new(machine: &Machine, period: f64) -> Self {
         let (rd, fd, rr) = (&machine.rear_drum, &machine.front_drum, &machine.rider_roll);
-        let shipping = &machine.shipping_roll;
         let path = &machine.idle[machine.load_cell_roll + 1..];
-        let path_mass: f64 = path.iter().map(|roll| roll.mass_kg()).sum();
-        let path_friction: f64 = path.iter().map(|roll| roll.friction_n_s_m).sum();
+        let shipping = &machine.shipping_roll;
         let (d_core, d_full) = (2.0 * shipping.core_radius_m, 2.0 * shipping.full_radius_m);
         let [share_core, share_full] = machine.operation.front_share;
         let slope = if d_full > d_core {
@@ -79,13 +80,14 @@ impl<R: Real> Drums<R> {
                 r_rd: r(rd.radius_m),
                 r_fd: r(fd.radius_m),
                 r_rr: r(rr.radius_m),
-                drum_mass: r(rd.mass_kg() + fd.mass_kg() + rr.mass_kg() + path_mass),
+                drum_mass: r(rd.mass_kg() + fd.mass_kg() + rr.mass_kg()),
                 roll_mass: r(machine.web.inertia_factor() / 4.0),
                 friction: r(rd.friction_n_s_m
                     + fd.friction_n_s_m
                     + rr.friction_n_s_m
-                    + shipping.friction_n_s_m
-                    + path_friction),
+                    + shipping.friction_n_s_m),
+                path_mass: r(path.iter().map(|roll| roll.mass_kg()).sum()),
+                path_friction: r(path.iter().map(|roll| roll.friction_n_s_m).sum()),
                 rider_mass: r(rr.mass_kg()),
                 rider_friction: r(rr.friction_n_s_m),
                 gains_per_mass: symmetrical_optimum(
@@ -112,9 +114,8 @@ impl<R: Real> Drums<R> {
 
     /// One period: torques of rear drum, front drum and rider roll, N·m. The unwind's is zero.
     ///
-    /// F = M̂·a* + ĉ·v* + t + PI(v* − v), with the measured tension t. M̂ and ĉ hold the idle rolls after the load
-    /// cells, too: what they take is not in the measured tension. The front drum takes its share of what is left
-    /// after the rider roll has turned itself.
+    /// F = M̂·a* + ĉ·v* + t + path + PI(v* − v), with the measured tension t and what the idle rolls after the load
+    /// cells take; the front drum takes its share of what is left after the rider roll has turned itself.
     pub fn step(&mut self, task: &DrumTask<R>, m: &Measurements<R>) -> BySection<R> {
         let c = &self.c;
         let error = task.v_ref - self.speed(m);
@@ -138,7 +139,9 @@ impl<R: Real> Drums<R> {
         // the drum that comes to its limit first limits the force, so that the split holds
         let limit = force_limit(limit_fd, lever_fd).min(force_limit(limit_rd, lever_rd));
 
-        let feed_forward = mass * task.a_ref + c.friction * task.v_ref + m.tension - rider_force;
+        let path = c.path_mass * task.a_ref + c.path_friction * task.v_ref;
+        let feed_forward =
+            mass * task.a_ref + c.friction * task.v_ref + m.tension + path - rider_force;
         let force = self.speed.step(&gains, error, feed_forward, -limit, limit);
         BySection {
             uw: R::ZERO,
