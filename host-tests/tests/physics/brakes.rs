@@ -38,6 +38,7 @@ fn time_to_stop<R: Real>(bench: &mut Bench<R>, speed: impl Fn(&Bench<R>) -> R) -
         assert!(speed(bench) > R::ZERO, "it turns back");
         bench.winder.step(&braked());
         steps += 1;
+        assert!(steps < 100_000, "it does not stop");
     }
     for _ in 0..1000 {
         bench.winder.step(&braked());

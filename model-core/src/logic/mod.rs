@@ -436,7 +436,10 @@ impl<R: Real> Logic<R> {
                 }
             }
             Mode::EmergencyStop | Mode::CoastStop if sight.standstill => self.switch_off(),
-            Mode::WebBreakStop if sight.standstill => self.mode = Mode::Ready,
+            // what follows has a gentler jerk, which could not end the ramp in time
+            Mode::WebBreakStop if sight.standstill && sight.drive.a_ref == R::ZERO => {
+                self.mode = Mode::Ready;
+            }
             _ => {}
         }
     }
