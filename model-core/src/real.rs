@@ -45,6 +45,10 @@ pub trait Real:
     /// The largest whole number that is not larger, saturating.
     fn floor_i32(self) -> i32;
 
+    /// Neither infinite nor no number.
+    fn is_finite(self) -> bool {
+        self - self == Self::ZERO
+    }
     /// |x|
     fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }
@@ -146,7 +150,7 @@ impl Real for f32 {
     }
     fn floor_i32(self) -> i32 {
         let toward_zero = self as i32;
-        toward_zero - i32::from(toward_zero as f32 > self)
+        toward_zero.saturating_sub(i32::from(toward_zero as f32 > self))
     }
     fn fingerprint(self) -> u32 {
         self.to_bits()
@@ -175,7 +179,7 @@ impl Real for f64 {
     }
     fn floor_i32(self) -> i32 {
         let toward_zero = self as i32;
-        toward_zero - i32::from(toward_zero as f64 > self)
+        toward_zero.saturating_sub(i32::from(toward_zero as f64 > self))
     }
     fn fingerprint(self) -> u32 {
         let bits = self.to_bits();

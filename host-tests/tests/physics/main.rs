@@ -18,6 +18,7 @@ mod description;
 mod form;
 mod integration;
 mod modes;
+mod nips;
 mod radii;
 mod schedule;
 mod sums;

@@ -33,6 +33,9 @@ pub const PLANT_PERIOD_MS: u32 = 4;
 /// Strain of a web that has just been led through by hand: 2 mm of loop for each metre.
 pub const THREADED_STRAIN: f64 = -0.002;
 
+/// Share of its radius that the core of a machine running backwards may lose before the web is off.
+const BARE: f64 = 0.99;
+
 /// The winder with its web, advanced by fixed steps.
 #[derive(Clone, Debug)]
 pub struct Winder<R: Real, const SPANS: usize> {
@@ -84,6 +87,8 @@ struct Coefficients<R, const SPANS: usize> {
     strength: R,
     strength_per_width: R,
     core_radius: R,
+    /// A shipping roll as thin as this has lost its web: the machine has run backwards.
+    bare_radius: R,
     full_radius: R,
     expire_radius: R,
     threaded_strain: R,
@@ -135,7 +140,10 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
             delay: Brakes::all(Delay::new(machine.brakes.delay_s, h)),
             closed: Brakes::default(),
             nips: [Nip::Sticks; ROLLS],
-            winding: Winding::default(),
+            winding: Winding {
+                wound_on_tension: R::of(machine.wound_on_tension.reference_n_m),
+                ..Winding::default()
+            },
             eccentricity: Eccentricity::new(machine, h),
             sensors: Sensors::new(machine, h),
             coefficients,
@@ -150,7 +158,7 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
             rd: self.delay.rd.step(actuators.brakes.rd),
             fd: self.delay.fd.step(actuators.brakes.fd),
         };
-        self.advance(actuators);
+        self.advance_whole(actuators);
         self.break_web_if_due();
         self.measure()
     }
@@ -176,7 +184,10 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
     /// takes the speed of the rear drum.
     pub fn set_state(&mut self, state: &State<R, SPANS>) {
         self.state = state.map(R::Sum::at);
-        if !self.coefficients.slips {
+        if self.coefficients.slips {
+            let v = state.speeds();
+            self.nips = v.rolls.map(|roll| Nip::between(roll, v.wu));
+        } else {
             self.state.windup = [self.state.v[SPANS - 1]; 3];
         }
         if self.threaded {
@@ -217,6 +228,19 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         self.threaded = true;
         self.state.strain = [R::Sum::at(strain); SPANS];
         self.web = self.coefficients.web(&self.state(), &Offsets::NONE);
+    }
+
+    /// Moves everything by h. A web that is torn so violently that the step could not follow it breaks at the start
+    /// of the step instead: the state stays finite whatever the motors do.
+    fn advance_whole(&mut self, actuators: &Actuators<R>) {
+        let before = (self.state, self.nips, self.eccentricity.clone());
+        self.advance(actuators);
+        let total = self.state().iter().fold(R::ZERO, |sum, x| sum + x);
+        if self.threaded && !total.is_finite() {
+            (self.state, self.nips, self.eccentricity) = before;
+            self.break_web();
+            self.advance(actuators);
+        }
     }
 
     /// Moves everything by h, the friction of brakes and nips as the step found it.
@@ -345,11 +369,16 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         };
     }
 
+    /// The web breaks when it is torn, when the parent roll has run out, and when it has been pulled off the core.
     fn break_web_if_due(&mut self) {
         let c = &self.coefficients;
         let torn = self.web.tension.iter().any(|t| *t > c.strength);
         let expired = self.state.r_uw.value() <= c.expire_radius;
-        if self.threaded && (torn || expired) {
+        let pulled_off = self.state.r_wu.value() < c.bare_radius;
+        if pulled_off {
+            self.state.r_wu = R::Sum::at(c.core_radius);
+        }
+        if self.threaded && (torn || expired || pulled_off) {
             self.break_web();
         }
     }
@@ -409,6 +438,7 @@ impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
             strength: R::of(web.strength_n_m * web.width_m),
             strength_per_width: R::of(web.strength_n_m),
             core_radius: R::of(machine.shipping_roll.core_radius_m),
+            bare_radius: R::of(BARE * machine.shipping_roll.core_radius_m),
             full_radius: R::of(machine.parent_roll.full_radius_m),
             expire_radius: R::of(machine.parent_roll.expire_radius_m),
             threaded_strain: R::of(THREADED_STRAIN),

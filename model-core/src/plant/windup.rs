@@ -80,6 +80,17 @@ pub enum Nip<R> {
     Slides(R),
 }
 
+impl<R: Real> Nip<R> {
+    /// The nip of a roll and the shipping roll at their speeds; how hard it pulls is for the next step to say.
+    pub fn between(roll: R, wu: R) -> Self {
+        if roll == wu {
+            Nip::Sticks
+        } else {
+            Nip::Slides(roll - wu)
+        }
+    }
+}
+
 /// All forces on the bodies but those of the nips, at one instant.
 struct Forces<R> {
     rolls: [R; ROLLS],
