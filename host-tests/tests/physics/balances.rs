@@ -1,6 +1,6 @@
 //! What goes in comes out: paper and energy, for the default machine and for random ones.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use model_core::exchange::BySection;
 use model_core::machine::{DrivenRoll, IdleRoll, Machine};
@@ -19,6 +19,8 @@ type Stretch = (f64, f64, f64);
 /// Relative errors of the balances over a run.
 #[derive(Debug, Default)]
 struct Balance {
+    /// Length that the parent roll gave, m.
+    length: f64,
     /// Of the length without strain that the parent roll gave, the spans hold and the shipping roll took.
     paper: f64,
     /// Of the length on the shipping roll by its area and by its surface.
@@ -56,6 +58,7 @@ impl Balance {
         let kept = taken + stored(&m, &end) - stored(&m, &start);
         let gain = kinetic(&m, &end) - kinetic(&m, &start);
         Self {
+            length: given,
             paper: (given / kept - 1.0).abs(),
             area: (rolled / travel - 1.0).abs(),
             energy: (gain - supplied).abs() / turnover,
@@ -199,9 +202,13 @@ proptest! {
         prop_assert!(m.validate().is_ok());
         let x = form::steady(&m, v, 1000.0, r_uw, r_wu);
         let in_f64 = Balance::of(&mut Bench::<f64>::threaded(m.clone(), &x), &schedule);
-        prop_assert!(in_f64.paper < 1e-6 && in_f64.area < 1e-6 && in_f64.energy < 1e-3, "{in_f64:?}");
-        // a run of seconds moves a radius by 1e4 ulp of f32
+        let good = in_f64.paper < 1e-6 && in_f64.area < 1e-6 && in_f64.energy < 1e-3;
+        prop_assert!(good, "{in_f64:?}");
+        // a run of seconds is short for f32: what an ulp of the radii at both ends is as length on the rolls
+        let ulp = TAU * 1.5 * 1.5 * f64::from(f32::EPSILON) / m.web.caliper_m;
+        let bound = 1e-5 + ulp / in_f64.length;
         let in_f32 = Balance::of(&mut Bench::<f32>::threaded(m, &x), &schedule);
-        prop_assert!(in_f32.paper < 1e-3 && in_f32.area < 1e-3 && in_f32.energy < 1e-3, "{in_f32:?}");
+        let good = in_f32.paper < bound && in_f32.area < bound && in_f32.energy < 1e-3;
+        prop_assert!(good, "{in_f32:?} with a bound of {bound}");
     }
 }
