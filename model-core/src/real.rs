@@ -46,9 +46,7 @@ pub trait Real:
     fn floor_i32(self) -> i32;
 
     /// Neither infinite nor no number.
-    fn is_finite(self) -> bool {
-        self - self == Self::ZERO
-    }
+    fn is_finite(self) -> bool;
     /// |x|
     fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }
@@ -152,6 +150,9 @@ impl Real for f32 {
         let toward_zero = self as i32;
         toward_zero.saturating_sub(i32::from(toward_zero as f32 > self))
     }
+    fn is_finite(self) -> bool {
+        f32::is_finite(self)
+    }
     fn fingerprint(self) -> u32 {
         self.to_bits()
     }
@@ -180,6 +181,9 @@ impl Real for f64 {
     fn floor_i32(self) -> i32 {
         let toward_zero = self as i32;
         toward_zero.saturating_sub(i32::from(toward_zero as f64 > self))
+    }
+    fn is_finite(self) -> bool {
+        f64::is_finite(self)
     }
     fn fingerprint(self) -> u32 {
         let bits = self.to_bits();

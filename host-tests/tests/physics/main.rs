@@ -21,6 +21,7 @@ mod modes;
 mod nips;
 mod radii;
 mod schedule;
+mod sensing;
 mod sums;
 mod web;
 

@@ -372,7 +372,8 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
     /// The web breaks when it is torn, when the parent roll has run out, and when it has been pulled off the core.
     fn break_web_if_due(&mut self) {
         let c = &self.coefficients;
-        let torn = self.web.tension.iter().any(|t| *t > c.strength);
+        let torn = |t: &R| *t > c.strength || !t.is_finite();
+        let torn = self.web.tension.iter().any(torn);
         let expired = self.state.r_uw.value() <= c.expire_radius;
         let pulled_off = self.state.r_wu.value() < c.bare_radius;
         if pulled_off {
