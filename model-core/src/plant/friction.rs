@@ -18,6 +18,14 @@ pub struct Friction<R> {
     pub sticks: bool,
 }
 
+impl<R: Real> Friction<R> {
+    /// No friction.
+    pub const NONE: Self = Self {
+        lambda: R::ZERO,
+        sticks: false,
+    };
+}
+
 /// Which law a closed brake follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law<R> {
@@ -97,10 +105,7 @@ impl<R: Real> Brake<R> {
     #[inline(always)]
     pub fn hold(&self, mass: R, v: R, external: R) -> Friction<R> {
         if self.sliding <= R::ZERO {
-            return Friction {
-                lambda: R::ZERO,
-                sticks: false,
-            };
+            return Friction::NONE;
         }
         match self.law {
             Law::SetValued { per_step } => {

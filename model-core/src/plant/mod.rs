@@ -19,13 +19,13 @@ use crate::exchange::{Actuators, Brakes, BySection, Measurements};
 use crate::machine::{Machine, MachineError};
 use crate::real::{Real, Sum};
 use eccentricity::{Eccentricity, Offsets};
-use friction::{Brake, Delay, Law};
+use friction::{Brake, Delay, Friction, Law};
 use nip::Nips;
 use rk4::{Rk4, State};
 use roll::{Idle, Unwind};
 use sensors::{Sensors, Sight};
 use span::{Spans, Web};
-use windup::{FRONT, Holding, Nip, ROLLS, ShippingRoll, Speeds, Traction, Windup};
+use windup::{FRONT, Holding, Nip, Parts, ROLLS, Speeds, Traction, Windup};
 
 /// Period of the plant task and step of its integration, ms.
 pub const PLANT_PERIOD_MS: u32 = 4;
@@ -53,12 +53,12 @@ pub struct Winder<R: Real, const SPANS: usize> {
     sensors: Sensors<R>,
 }
 
-/// How the shipping roll is being wound: ground truth.
+/// How the shipping roll is being wound: ground truth. Known only where slip or layers that compress are computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Winding<R> {
     /// Forces of the nips on the shipping roll, N: rear drum, front drum, rider roll.
     pub nip_force: [R; ROLLS],
-    /// Loads of the nips per width, N/m; zero where neither slip nor layers that compress are computed.
+    /// Loads of the nips per width, N/m.
     pub nip_load: [R; ROLLS],
     /// Nips that slide.
     pub slides: [bool; ROLLS],
@@ -158,7 +158,7 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
             rd: self.delay.rd.step(actuators.brakes.rd),
             fd: self.delay.fd.step(actuators.brakes.fd),
         };
-        self.advance_whole(actuators);
+        self.advance(actuators);
         self.break_web_if_due();
         self.measure()
     }
@@ -200,7 +200,7 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         self.web.tension
     }
 
-    /// How the shipping roll is being wound: ground truth.
+    /// How the shipping roll is being wound: ground truth. Known only where slip or layers that compress are computed.
     pub fn winding(&self) -> &Winding<R> {
         &self.winding
     }
@@ -230,19 +230,6 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         self.web = self.coefficients.web(&self.state(), &Offsets::NONE);
     }
 
-    /// Moves everything by h. A web that is torn so violently that the step could not follow it breaks at the start
-    /// of the step instead: the state stays finite whatever the motors do.
-    fn advance_whole(&mut self, actuators: &Actuators<R>) {
-        let before = (self.state, self.nips, self.eccentricity.clone());
-        self.advance(actuators);
-        let total = self.state().iter().fold(R::ZERO, |sum, x| sum + x);
-        if self.threaded && !total.is_finite() {
-            (self.state, self.nips, self.eccentricity) = before;
-            self.break_web();
-            self.advance(actuators);
-        }
-    }
-
     /// Moves everything by h, the friction of brakes and nips as the step found it.
     fn advance(&mut self, actuators: &Actuators<R>) {
         self.state.travel = R::Sum::at(R::ZERO);
@@ -258,18 +245,11 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         } else {
             R::ZERO
         };
-        let roll = c.windup.shipping_roll(x.r_wu, x.v[SPANS - 1] * layer);
-        let mut holding = self.hold_windup(&actuators.torque, &x, &roll, traction.as_ref());
-        let brake_uw = c.brake_uw(self.closed.uw, x.r_uw);
-        let inertia = c.unwind.inertia(x.r_uw);
-        let v_uw = x.omega_uw * x.r_uw;
-        let free = c
-            .unwind
-            .torque(actuators.torque.uw, self.web.tension[0], v_uw, x.r_uw);
-        let unwind = brake_uw.hold(inertia, x.omega_uw, free);
+        let unwind = self.hold_unwind(actuators.torque.uw, &x);
+        let mut windup = self.hold_windup(&actuators.torque, &x, layer, traction.as_ref());
         let load = Load {
             uw: actuators.torque.uw - unwind.lambda,
-            windup: holding.load,
+            windup: windup.parts.load(),
             layer,
             threaded: self.threaded,
         };
@@ -287,17 +267,22 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         if unwind.sticks {
             self.state.omega_uw = R::Sum::at(R::ZERO);
         }
-        self.settle_windup(&roll, &mut holding);
+        if !windup.goes_on() {
+            self.settle_windup(&x, &mut windup);
+        }
+        self.stop_wreck(&x);
         if self.threaded {
             self.web = self.coefficients.web(&self.state(), &offsets);
         }
-        self.look_at_winding(&holding);
+        if self.coefficients.winds() {
+            self.look_at_winding(&windup);
+        }
     }
 
     /// What the nips can carry in this step, where they may let go; what slides is pulled with that.
     fn load_nips(&mut self, r_wu: R) -> Option<Traction<R>> {
         let c = &self.coefficients;
-        if c.slips || c.nips.compress() {
+        if c.winds() {
             self.winding.nip_load = c.nips.loads(r_wu);
         }
         if !c.slips {
@@ -315,34 +300,53 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         })
     }
 
+    /// How the brake of the unwind holds over the step that starts at `x`.
+    fn hold_unwind(&self, torque: R, x: &State<R, SPANS>) -> Friction<R> {
+        let c = &self.coefficients;
+        if !self.closed.uw {
+            return Friction::NONE;
+        }
+        let v = x.omega_uw * x.r_uw;
+        let free = c.unwind.torque(torque, self.web.tension[0], v, x.r_uw);
+        let brake = c.brake_uw(x.r_uw);
+        brake.hold(c.unwind.inertia(x.r_uw), x.omega_uw, free)
+    }
+
     /// How nips and brakes of the windup hold over the step that starts at `x`.
     fn hold_windup(
         &self,
         torque: &BySection<R>,
         x: &State<R, SPANS>,
-        roll: &ShippingRoll<R>,
+        layer: R,
         traction: Option<&Traction<R>>,
     ) -> Holding<R> {
         let c = &self.coefficients;
+        let drive = c.windup.drive(torque);
+        if !(c.winds() || self.closed.rd || self.closed.fd) {
+            return Holding::free(drive);
+        }
+        let parts = Parts {
+            drive,
+            nips: self.nips,
+        };
         let brakes = [
             c.brakes.rd.when(self.closed.rd),
             c.brakes.fd.when(self.closed.fd),
             Brake::NONE,
         ];
-        let load = windup::Load {
-            drive: c.windup.drive(torque),
-            nips: self.nips,
-        };
+        let roll = c.windup.shipping_roll(x.r_wu, x.v[SPANS - 1] * layer);
         let t_sr = self.web.tension[SPANS - 1];
         c.windup
-            .hold(&x.speeds(), roll, t_sr, load, &brakes, traction)
+            .hold(&x.speeds(), &roll, t_sr, parts, &brakes, traction)
     }
 
-    fn settle_windup(&mut self, roll: &ShippingRoll<R>, holding: &mut Holding<R>) {
+    fn settle_windup(&mut self, x: &State<R, SPANS>, holding: &mut Holding<R>) {
+        let c = &self.coefficients;
+        let roll = c.windup.shipping_roll(x.r_wu, R::ZERO);
         let moved = self.state().speeds();
         let mut settled = moved;
-        self.coefficients.windup.settle(&mut settled, roll, holding);
-        self.nips = holding.load.nips;
+        c.windup.settle(&mut settled, &roll, holding);
+        self.nips = holding.parts.nips;
         // only what has been changed loses what its sum carries
         let put = |sum: &mut R::Sum, from: R, to: R| {
             if from != to {
@@ -354,6 +358,20 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         put(&mut self.state.windup[0], moved.rolls[1], fd);
         put(&mut self.state.windup[1], moved.rolls[2], rr);
         put(&mut self.state.windup[2], moved.wu, settled.wu);
+    }
+
+    /// A step so violent that its numbers overflow leaves a wreck: the web torn, the machine at standstill, the
+    /// rolls as they were. So the state stays finite whatever the motors do.
+    fn stop_wreck(&mut self, before: &State<R, SPANS>) {
+        let total = self.state().iter().fold(R::ZERO, |sum, x| sum + x);
+        if total.is_finite() {
+            return;
+        }
+        self.state = before.map(|_| R::Sum::at(R::ZERO));
+        self.state.r_uw = R::Sum::at(before.r_uw);
+        self.state.r_wu = R::Sum::at(before.r_wu);
+        self.nips = [Nip::Sticks; ROLLS];
+        self.break_web();
     }
 
     fn look_at_winding(&mut self, holding: &Holding<R>) {
@@ -451,13 +469,17 @@ impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
         coefficients
     }
 
+    /// Nip loads and wound-on tension are wanted.
+    fn winds(&self) -> bool {
+        self.slips || self.nips.compress()
+    }
+
     /// The unwind's brake at a radius: the stiction band is one of the surface.
-    fn brake_uw(&self, closed: bool, r: R) -> Brake<R> {
-        let brake = match self.karnopp {
+    fn brake_uw(&self, r: R) -> Brake<R> {
+        match self.karnopp {
             Some(band) => self.brakes.uw.following(Law::Karnopp { band: band / r }),
             None => self.brakes.uw,
-        };
-        brake.when(closed)
+        }
     }
 
     #[inline(always)]

@@ -31,6 +31,9 @@ pub struct Windup<R> {
     friction: [R; ROLLS],
     /// Rolling resistance of the shipping roll c_wu, N·s/m.
     resistance: R,
+    /// Sums of both over all rolls, as {15} has them.
+    drum_mass: R,
+    all_friction: R,
     /// ½·π·ρ·W, kg/m².
     inertia_factor: R,
     /// ½·π·ρ·W·R_core⁴, kg·m².
@@ -53,6 +56,14 @@ pub struct ShippingRoll<R> {
     pub radius_rate: R,
 }
 
+impl<R: Real> ShippingRoll<R> {
+    /// (J_wu/R_wu²)·(Ṙ_wu/R_wu): the paper that arrives brings its speed along, kg/s.
+    #[inline(always)]
+    fn growth(&self) -> R {
+        self.mass * (self.radius_rate * self.per_radius)
+    }
+}
+
 /// Surface speeds, or their rates: of the three rolls, and of the shipping roll.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Speeds<T> {
@@ -62,9 +73,18 @@ pub struct Speeds<T> {
     pub wu: T,
 }
 
-/// What acts at the surfaces over one step, constant.
+/// What acts on the windup over one step, constant.
 #[derive(Clone, Copy, Debug)]
-pub struct Load<R> {
+pub enum Load<R> {
+    /// All nips stick: one body, driven by this force at its surface, N.
+    Whole(R),
+    /// Roll by roll.
+    Apart(Parts<R>),
+}
+
+/// What acts at the surfaces roll by roll.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts<R> {
     /// Torque of the motor less that of the brake, at the surface of each roll, N.
     pub drive: [R; ROLLS],
     /// What is known of each nip.
@@ -78,6 +98,37 @@ pub enum Nip<R> {
     Sticks,
     /// The roll slides and pulls the shipping roll with this force, N, in the direction of its slip.
     Slides(R),
+}
+
+impl<R: Real> Parts<R> {
+    /// The load of a step.
+    pub fn load(&self) -> Load<R> {
+        if self.nips.iter().all(|nip| *nip == Nip::Sticks) {
+            Load::Whole(self.drive[0] + self.drive[1] + self.drive[2])
+        } else {
+            Load::Apart(*self)
+        }
+    }
+}
+
+impl<R: Real> Holding<R> {
+    /// Without brakes, all nips sticking; their forces are not asked for.
+    pub fn free(drive: [R; ROLLS]) -> Self {
+        Self {
+            parts: Parts {
+                drive,
+                nips: [Nip::Sticks; ROLLS],
+            },
+            nip_force: [R::ZERO; ROLLS],
+            roll_stops: false,
+            stops: [false; ROLLS],
+        }
+    }
+
+    /// Nothing is to be done at the end of the step.
+    pub fn goes_on(&self) -> bool {
+        !self.roll_stops && self.parts.nips.iter().all(|nip| *nip == Nip::Sticks)
+    }
 }
 
 impl<R: Real> Nip<R> {
@@ -106,8 +157,8 @@ struct Body<R> {
 /// How the nips and the brakes of the windup hold in one step.
 #[derive(Clone, Copy, Debug)]
 pub struct Holding<R> {
-    /// The load of the step.
-    pub load: Load<R>,
+    /// Drives less brakes, and the nips.
+    pub parts: Parts<R>,
     /// Tangential force of each nip on the shipping roll, N.
     pub nip_force: [R; ROLLS],
     /// The brakes bring the shipping roll, and what sticks to it, to rest.
@@ -134,6 +185,10 @@ impl<R: Real> Windup<R> {
             mass: rolls.map(|roll| R::of(roll.mass_kg())),
             friction: rolls.map(|roll| R::of(roll.friction_n_s_m)),
             resistance: R::of(roll.friction_n_s_m),
+            drum_mass: R::of(rolls.iter().map(|roll| roll.mass_kg()).sum()),
+            all_friction: R::of(
+                rolls.iter().map(|roll| roll.friction_n_s_m).sum::<f64>() + roll.friction_n_s_m,
+            ),
             inertia_factor: R::of(machine.web.inertia_factor()),
             core_inertia: R::of(machine.web.roll_inertia(roll.core_radius_m)),
             layer: R::of(machine.web.caliper_m / core::f64::consts::TAU),
@@ -166,7 +221,8 @@ impl<R: Real> Windup<R> {
     /// m_j·V̇_j = T_j/R_j − c_j·V_j − F_j, for the rear drum less t_sr, and
     /// m_wu·V̇_wu = Σ F_j − c_wu·V_wu + m_wu·(Ṙ_wu/R_wu)·V_wu,
     ///
-    /// where sticking nips take the F_j that keeps their speeds equal. All sticking, this is {15}.
+    /// where sticking nips take the F_j that keeps their speeds equal. All sticking, this is {15}:
+    /// M·V̇ = Σ T_j/R_j − t_sr − \[Σ c_j − (J_wu/R_wu²)·(Ṙ_wu/R_wu)\]·V
     #[inline(always)]
     pub fn rates(
         &self,
@@ -175,11 +231,31 @@ impl<R: Real> Windup<R> {
         t_sr: R,
         load: &Load<R>,
     ) -> Speeds<R> {
-        let forces = self.forces(v, roll, t_sr, &load.drive);
-        let body = self.body(&forces, roll, &load.nips);
+        match load {
+            Load::Whole(drive) => {
+                let friction = (self.all_friction - roll.growth()) * v.rolls[REAR];
+                let rate = (*drive - t_sr - friction) / self.mass(roll);
+                Speeds {
+                    rolls: [rate; ROLLS],
+                    wu: rate,
+                }
+            }
+            Load::Apart(parts) => self.rates_apart(v, roll, t_sr, parts),
+        }
+    }
+
+    fn rates_apart(
+        &self,
+        v: &Speeds<R>,
+        roll: &ShippingRoll<R>,
+        t_sr: R,
+        parts: &Parts<R>,
+    ) -> Speeds<R> {
+        let forces = self.forces(v, roll, t_sr, &parts.drive);
+        let body = self.body(&forces, roll, &parts.nips);
         let common = body.force / body.mass;
         Speeds {
-            rolls: core::array::from_fn(|j| match load.nips[j] {
+            rolls: core::array::from_fn(|j| match parts.nips[j] {
                 Nip::Sticks => common,
                 Nip::Slides(force) => (forces.rolls[j] - force) / self.mass[j],
             }),
@@ -189,10 +265,9 @@ impl<R: Real> Windup<R> {
 
     /// {15} M = J_rd/R_rd² + J_fd/R_fd² + J_rr/R_rr² + J_wu/R_wu², kg: of the windup as one body.
     pub fn mass(&self, roll: &ShippingRoll<R>) -> R {
-        self.mass.iter().fold(roll.mass, |sum, mass| sum + *mass)
+        self.drum_mass + roll.mass
     }
 
-    #[inline(always)]
     fn forces(
         &self,
         v: &Speeds<R>,
@@ -202,14 +277,12 @@ impl<R: Real> Windup<R> {
     ) -> Forces<R> {
         let mut rolls = core::array::from_fn(|j| drive[j] - self.friction[j] * v.rolls[j]);
         rolls[REAR] -= t_sr;
-        let growth = roll.mass * (roll.radius_rate * roll.per_radius);
         Forces {
             rolls,
-            wu: (growth - self.resistance) * v.wu,
+            wu: (roll.growth() - self.resistance) * v.wu,
         }
     }
 
-    #[inline(always)]
     fn body(&self, forces: &Forces<R>, roll: &ShippingRoll<R>, nips: &[Nip<R>; ROLLS]) -> Body<R> {
         let mut body = Body {
             mass: roll.mass,
@@ -242,17 +315,17 @@ impl<R: Real> Windup<R> {
         v: &Speeds<R>,
         roll: &ShippingRoll<R>,
         t_sr: R,
-        mut load: Load<R>,
+        mut parts: Parts<R>,
         brakes: &[Brake<R>; ROLLS],
         traction: Option<&Traction<R>>,
     ) -> Holding<R> {
         loop {
-            let holding = self.hold_with(v, roll, t_sr, load, brakes);
+            let holding = self.hold_with(v, roll, t_sr, parts, brakes);
             let Some(traction) = traction else {
                 return holding;
             };
             let excess = |j: &usize| holding.nip_force[*j].abs() - traction.sticking[*j];
-            let sticking = (0..ROLLS).filter(|j| load.nips[*j] == Nip::Sticks);
+            let sticking = (0..ROLLS).filter(|j| parts.nips[*j] == Nip::Sticks);
             let loosest = sticking
                 .filter(|j| excess(j) > R::ZERO)
                 .reduce(|a, b| if excess(&b) > excess(&a) { b } else { a });
@@ -261,7 +334,7 @@ impl<R: Real> Windup<R> {
             };
             let pull = traction.sliding[j];
             let forward = holding.nip_force[j] > R::ZERO;
-            load.nips[j] = Nip::Slides(if forward { pull } else { -pull });
+            parts.nips[j] = Nip::Slides(if forward { pull } else { -pull });
         }
     }
 
@@ -270,13 +343,13 @@ impl<R: Real> Windup<R> {
         v: &Speeds<R>,
         roll: &ShippingRoll<R>,
         t_sr: R,
-        mut load: Load<R>,
+        mut parts: Parts<R>,
         brakes: &[Brake<R>; ROLLS],
     ) -> Holding<R> {
-        let free = self.forces(v, roll, t_sr, &load.drive);
-        let body = self.body(&free, roll, &load.nips);
+        let free = self.forces(v, roll, t_sr, &parts.drive);
+        let body = self.body(&free, roll, &parts.nips);
         let shared = (0..ROLLS)
-            .filter(|j| load.nips[*j] == Nip::Sticks)
+            .filter(|j| parts.nips[*j] == Nip::Sticks)
             .fold(Brake::NONE, |sum, j| sum.with(&brakes[j]));
         let common = shared.hold(body.mass, v.wu, body.force);
         let acceleration = (body.force - common.lambda) / body.mass;
@@ -284,7 +357,7 @@ impl<R: Real> Windup<R> {
         let mut stops = [false; ROLLS];
         let mut nip_force = [R::ZERO; ROLLS];
         for j in 0..ROLLS {
-            let lambda = match load.nips[j] {
+            let lambda = match parts.nips[j] {
                 Nip::Sticks => common.lambda * brakes[j].share_of(&shared),
                 Nip::Slides(force) => {
                     let own: Friction<R> =
@@ -293,14 +366,14 @@ impl<R: Real> Windup<R> {
                     own.lambda
                 }
             };
-            nip_force[j] = match load.nips[j] {
+            nip_force[j] = match parts.nips[j] {
                 Nip::Sticks => free.rolls[j] - lambda - self.mass[j] * acceleration,
                 Nip::Slides(force) => force,
             };
-            load.drive[j] -= lambda;
+            parts.drive[j] -= lambda;
         }
         Holding {
-            load,
+            parts,
             nip_force,
             roll_stops: common.sticks,
             stops,
@@ -310,7 +383,7 @@ impl<R: Real> Windup<R> {
     /// Ends a step: bodies that are held stand still, and rolls whose slip has come to its end stick again, at the
     /// speed that keeps the momentum.
     pub fn settle(&self, v: &mut Speeds<R>, roll: &ShippingRoll<R>, holding: &mut Holding<R>) {
-        let nips = &mut holding.load.nips;
+        let nips = &mut holding.parts.nips;
         if holding.roll_stops {
             v.wu = R::ZERO;
         }
