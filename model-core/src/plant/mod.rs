@@ -363,8 +363,11 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
     /// A step so violent that its numbers overflow leaves a wreck: the web torn, the machine at standstill, the
     /// rolls as they were. So the state stays finite whatever the motors do.
     fn stop_wreck(&mut self, before: &State<R, SPANS>) {
-        let total = self.state().iter().fold(R::ZERO, |sum, x| sum + x);
-        if total.is_finite() {
+        // one number that is not finite makes the sum so
+        let x = self.state();
+        let sum = |values: &[R]| values.iter().fold(R::ZERO, |sum, x| sum + *x);
+        let radii = x.omega_uw + x.r_uw + x.r_wu + x.travel;
+        if (sum(&x.strain) + sum(&x.v) + sum(&x.windup) + radii).is_finite() {
             return;
         }
         self.state = before.map(|_| R::Sum::at(R::ZERO));
