@@ -232,11 +232,9 @@ macro_rules! parameter {
             unit: $unit,
             about: $about,
             index: $index,
-            limits: |_m, _i| {
-                let ($lm, $li) = (_m, _i);
-                let _ = ($lm, $li);
-                $limits
-            },
+            // few limits depend on the machine
+            #[allow(unused_variables)]
+            limits: |$lm, $li| $limits,
             get: |$gm, $gi| Some(Field::value(&$get)),
             set: |$sm, $si, value| Field::put(&mut $set, value),
         }
