@@ -8,6 +8,7 @@ pub mod command;
 pub mod interrupt;
 pub mod link;
 pub mod log;
+pub mod machine_file;
 pub mod plant;
 pub mod plc;
 pub mod plot;

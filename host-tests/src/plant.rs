@@ -8,6 +8,11 @@
 //! from the first step of 4 ms at or after its time until the next row does; the last row only says when the run
 //! ends. Time is counted in whole steps.
 //!
+//! The output is CSV, too: `t_s`; the surface speeds of unwind, idle rolls and rear drum, m/s; the tensions of the
+//! spans, each named after the roll it leaves, N; the radii `r_uw` and `r_wu`, m. The idle rolls of a machine with
+//! two of them are `gr` and `sr`, those of any other are numbered from 1 in the web's direction:
+//! `t_s,v_uw,v_1,…,v_7,v_rd,t_uw,t_1,…,t_7,r_uw,r_wu`.
+//!
 //! The run starts at standstill: all spans at stall tension, full parent roll, bare core, brakes off.
 
 use std::fs::File;
@@ -16,12 +21,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use model_core::exchange::{Actuators, Brakes, BySection};
-use model_core::machine::{Machine, PRESETS};
+use model_core::machine::{MAX_SPANS, Machine, PRESETS};
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
 use model_core::real::Real;
 
-/// Spans of the lumped machine, whose rolls the columns of the output name.
-const SPANS: usize = 3;
+use crate::machine_file::Description;
+
+/// Spans of a machine whose idle rolls are lumped: guide rolls `gr`, spreader rolls `sr`.
+const LUMPED: usize = 3;
 /// Step of the plant, ns.
 const STEP_NS: u64 = 1_000_000 * PLANT_PERIOD_MS as u64;
 /// Longest schedule, s: eleven days.
@@ -44,8 +51,8 @@ pub struct Options {
     /// Speeds, tensions and radii over time, as CSV in SI units; `-` prints them
     #[arg(long, value_name = "FILE.csv")]
     pub out: PathBuf,
-    /// Machine by the name of its preset
-    #[arg(long, value_name = "NAME", default_value = PRESETS[0].0)]
+    /// Machine: a preset or a machine file, see `cargo winder machine`
+    #[arg(long, value_name = "NAME|FILE", default_value = PRESETS[0].0)]
     pub machine: String,
     /// Numbers to compute with; the microcontroller has f32
     #[arg(long, value_enum, default_value_t = Scalar::F64)]
@@ -74,7 +81,7 @@ pub enum Scalar {
 /// `console` gets a line about what was done, or the result itself when the output file is `-`. Nothing is
 /// written before machine, schedule and options have been found good.
 pub fn run(options: &Options, console: &mut dyn Write) -> Result<()> {
-    let machine = preset(&options.machine)?;
+    let machine = Description::find(&options.machine)?.machine;
     let every = output_period(options.every_s)?;
     let schedule = Schedule::open(&options.schedule)?;
     let simulate = match options.scalar {
@@ -93,16 +100,6 @@ pub fn run(options: &Options, console: &mut dyn Write) -> Result<()> {
         .with_context(|| format!("cannot write {path}"))?;
     writeln!(console, "{path}: {rows} rows")?;
     Ok(())
-}
-
-fn preset(name: &str) -> Result<Machine> {
-    Machine::preset(name).ok_or_else(|| {
-        let names: Vec<_> = PRESETS.iter().map(|(name, _)| *name).collect();
-        anyhow!(
-            "no machine is named {name:?}; there are {}",
-            names.join(", ")
-        )
-    })
 }
 
 /// Steps from row to row of the output.
@@ -287,8 +284,27 @@ fn switch(column: &str, field: &str) -> Result<bool> {
     }
 }
 
-/// Runs the plant and writes a row at the start and every `every` steps; gives the number of rows.
+/// [`simulate_spans`] with the machine's number of spans.
 fn simulate<R: Real>(
+    machine: &Machine,
+    schedule: &Schedule,
+    every: u64,
+    out: &mut dyn Write,
+) -> Result<u64> {
+    let simulate = match machine.idle.len() + 1 {
+        2 => simulate_spans::<R, 2>,
+        3 => simulate_spans::<R, 3>,
+        4 => simulate_spans::<R, 4>,
+        5 => simulate_spans::<R, 5>,
+        6 => simulate_spans::<R, 6>,
+        7 => simulate_spans::<R, 7>,
+        _ => simulate_spans::<R, MAX_SPANS>,
+    };
+    simulate(machine, schedule, every, out)
+}
+
+/// Runs the plant and writes a row at the start and every `every` steps; gives the number of rows.
+fn simulate_spans<R: Real, const SPANS: usize>(
     machine: &Machine,
     schedule: &Schedule,
     every: u64,
@@ -296,7 +312,7 @@ fn simulate<R: Real>(
 ) -> Result<u64> {
     let mut winder = Winder::<R, SPANS>::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS))?;
     winder.thread_at(R::of(stall_tension(machine)));
-    writeln!(out, "t_s,v_uw,v_gr,v_sr,v_rd,t_uw,t_gr,t_sr,r_uw,r_wu")?;
+    writeln!(out, "{}", header(SPANS))?;
     write_row(out, 0, &winder)?;
     for (step, row) in (1_u64..).zip(schedule.steps()) {
         winder.step(&Actuators {
@@ -311,13 +327,28 @@ fn simulate<R: Real>(
     Ok(schedule.end() / every + 1)
 }
 
+/// The columns of the output: speeds of the rolls, tensions of the spans behind them, radii.
+fn header(spans: usize) -> String {
+    let idle: Vec<_> = match spans {
+        LUMPED => vec!["gr".into(), "sr".into()],
+        spans => (1..spans).map(|roll| roll.to_string()).collect(),
+    };
+    let columns = |prefix| idle.iter().map(move |roll| format!("{prefix}_{roll},"));
+    let (v, t): (String, String) = (columns("v").collect(), columns("t").collect());
+    format!("t_s,v_uw,{v}v_rd,t_uw,{t}r_uw,r_wu")
+}
+
 /// Tension at standstill, N.
 fn stall_tension(machine: &Machine) -> f64 {
     machine.operation.stall_share * machine.operation.tension_n_m * machine.web.width_m
 }
 
 /// One row of the output. `Debug` gives the shortest digits that read back as the same number.
-fn write_row<R: Real>(out: &mut dyn Write, step: u64, winder: &Winder<R, SPANS>) -> io::Result<()> {
+fn write_row<R: Real, const SPANS: usize>(
+    out: &mut dyn Write,
+    step: u64,
+    winder: &Winder<R, SPANS>,
+) -> io::Result<()> {
     let (x, t) = (winder.state(), winder.tension());
     let v_uw = x.omega_uw * x.r_uw;
     let seconds = (step * u64::from(PLANT_PERIOD_MS)) as f64 / 1e3;
@@ -435,11 +466,5 @@ mod tests {
             let error = output_period(every_s).unwrap_err().to_string();
             assert!(error.starts_with(&format!("--every {every_s} ")), "{error}");
         }
-    }
-
-    #[test]
-    fn an_unknown_machine_is_answered_with_the_names_of_the_presets() {
-        let error = preset("WIND-9").unwrap_err().to_string();
-        assert_eq!(error, "no machine is named \"WIND-9\"; there are NEWS-8000");
     }
 }

@@ -75,3 +75,64 @@ fn signals_are_a_csv_table() {
         b"name,direction,section,type,unit,scale,modbus_table,modbus_address,description\n";
     assert!(list.stdout.starts_with(header));
 }
+
+/// What `machine` prints is what `plant --machine` takes; the rolls' columns are numbered unless they are lumped.
+#[test]
+fn a_machine_is_printed_changed_and_run() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name| directory.path().join(name).to_str().unwrap().to_owned();
+    let (schedule, machine) = (path("torques.csv"), path("mine.toml"));
+    std::fs::write(
+        &schedule,
+        "t_s,T_uw,T_rd,T_fd,T_rr\n0,-2,3,3,0\n1,0,0,0,0\n",
+    )
+    .unwrap();
+    let run = |machine: &str| {
+        let arguments = [
+            "plant",
+            "--schedule",
+            &schedule,
+            "--out",
+            "-",
+            "--machine",
+            machine,
+        ];
+        winder(&arguments).output().unwrap()
+    };
+    for (preset, header) in [
+        (
+            "LAB-300",
+            "t_s,v_uw,v_gr,v_sr,v_rd,t_uw,t_gr,t_sr,r_uw,r_wu",
+        ),
+        (
+            "NEWS-8000-UNLUMPED",
+            "t_s,v_uw,v_1,v_2,v_3,v_4,v_5,v_6,v_7,v_rd,t_uw,t_1,t_2,t_3,t_4,t_5,t_6,t_7,r_uw,r_wu",
+        ),
+    ] {
+        let printed = winder(&["machine", preset]).output().unwrap().stdout;
+        std::fs::write(&machine, &printed).unwrap();
+        let by_file = run(&machine);
+        assert!(by_file.stdout.starts_with(header.as_bytes()), "{by_file:?}");
+        assert_eq!(by_file.stdout, run(preset).stdout, "{preset}");
+
+        let printed = String::from_utf8(printed).unwrap();
+        std::fs::write(
+            &machine,
+            printed.replacen("last_span_m = ", "last_span_m = -", 1),
+        )
+        .unwrap();
+        let refused = run(&machine);
+        assert_eq!(refused.status.code(), Some(1));
+        let said = String::from_utf8_lossy(&refused.stderr);
+        assert!(said.contains("mine.toml:2: last_span_m = -"), "{said}");
+        assert!(said.contains(" is outside 0.05 to 50"), "{said}");
+    }
+}
+
+#[test]
+fn the_list_of_machines_names_every_preset() {
+    let list = winder(&["machine", "--list"]).output().unwrap();
+    let list = String::from_utf8(list.stdout).unwrap();
+    let names = list.lines().filter_map(|line| line.split(' ').next());
+    assert!(names.eq(model_core::machine::PRESETS.iter().map(|(name, _)| *name)));
+}

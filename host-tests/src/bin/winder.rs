@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use host_tests::command::{demo, run, signals, test};
+use host_tests::command::{demo, machine, run, signals, test};
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
 
@@ -31,6 +31,10 @@ enum Command {
     Test,
     /// Run the winder alone, open loop, from a schedule of torques
     Plant(plant::Options),
+    /// Print a machine as a file: every parameter with its unit, limits and description
+    ///
+    /// The file is what `--machine` takes. One of your own names a preset and what differs from it.
+    Machine(machine::Args),
     /// Print the signal list as CSV
     Signals,
 }
@@ -52,6 +56,7 @@ fn main() -> ExitCode {
 fn run(cli: Cli) -> Result<ExitCode> {
     match cli.command {
         Command::Signals => signals::main(),
+        Command::Machine(args) => machine::main(&args),
         Command::Plant(options) => {
             plant::run(&options, &mut std::io::stdout().lock())?;
             Ok(ExitCode::SUCCESS)

@@ -1,6 +1,7 @@
 //! The subcommands of `winder`, a module each.
 
 pub mod demo;
+pub mod machine;
 pub mod run;
 pub mod signals;
 pub mod test;
