@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::machine::{MAX_SPANS, Machine, PRESETS};
+use model_core::plant::windup::ROLLS;
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
 use model_core::real::Real;
 
@@ -95,11 +96,58 @@ pub fn run(options: &Options, console: &mut dyn Write) -> Result<()> {
     let path = options.out.display();
     let file = File::create(&options.out).with_context(|| format!("cannot write {path}"))?;
     let mut file = BufWriter::new(file);
-    let rows = simulate(&machine, &schedule, every, &mut file)
-        .and_then(|rows| Ok(file.flush().map(|()| rows)?))
+    let run = simulate(&machine, &schedule, every, &mut file)
+        .and_then(|run| Ok(file.flush().map(|()| run)?))
         .with_context(|| format!("cannot write {path}"))?;
-    writeln!(console, "{path}: {rows} rows")?;
+    for event in run.events {
+        writeln!(console, "{event}")?;
+    }
+    writeln!(console, "{path}: {} rows", run.rows)?;
     Ok(())
+}
+
+/// Events that are told of a run; a roll on the verge of its traction may lose it again and again.
+const MOST_EVENTS: usize = 20;
+
+/// What came of a run besides its rows.
+#[derive(Clone, Debug, Default)]
+struct Run {
+    rows: u64,
+    /// What happened, with its time.
+    events: Vec<String>,
+}
+
+/// Sees what happens to web and shipping roll from step to step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Incidents {
+    web_broken: bool,
+    slides: [bool; ROLLS],
+    burst: bool,
+}
+
+impl Incidents {
+    fn of<R: Real, const SPANS: usize>(winder: &Winder<R, SPANS>) -> Self {
+        let winding = winder.winding();
+        Self {
+            web_broken: !winder.threaded(),
+            slides: winding.slides,
+            burst: winding.burst,
+        }
+    }
+
+    /// What is new since `before`.
+    fn since(&self, before: &Self) -> impl Iterator<Item = &'static str> {
+        const LOST: [&str; ROLLS] = [
+            "the rear drum loses traction",
+            "the front drum loses traction",
+            "the rider roll loses traction",
+        ];
+        let slips = (0..ROLLS).filter(|i| self.slides[*i] && !before.slides[*i]);
+        let breaks = (self.web_broken && !before.web_broken).then_some("the web breaks");
+        let bursts = (self.burst && !before.burst).then_some("the shipping roll bursts");
+        let slips: Vec<_> = slips.map(|i| LOST[i]).collect();
+        slips.into_iter().chain(breaks).chain(bursts)
+    }
 }
 
 /// Steps from row to row of the output.
@@ -290,7 +338,7 @@ fn simulate<R: Real>(
     schedule: &Schedule,
     every: u64,
     out: &mut dyn Write,
-) -> Result<u64> {
+) -> Result<Run> {
     let simulate = match machine.idle.len() + 1 {
         2 => simulate_spans::<R, 2>,
         3 => simulate_spans::<R, 3>,
@@ -303,28 +351,41 @@ fn simulate<R: Real>(
     simulate(machine, schedule, every, out)
 }
 
-/// Runs the plant and writes a row at the start and every `every` steps; gives the number of rows.
+/// Runs the plant and writes a row at the start and every `every` steps.
 fn simulate_spans<R: Real, const SPANS: usize>(
     machine: &Machine,
     schedule: &Schedule,
     every: u64,
     out: &mut dyn Write,
-) -> Result<u64> {
+) -> Result<Run> {
     let mut winder = Winder::<R, SPANS>::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS))?;
     winder.thread_at(R::of(stall_tension(machine)));
     writeln!(out, "{}", header(SPANS))?;
     write_row(out, 0, &winder)?;
+    let mut run = Run {
+        rows: schedule.end() / every + 1,
+        events: Vec::new(),
+    };
+    let mut before = Incidents::of(&winder);
     for (step, row) in (1_u64..).zip(schedule.steps()) {
         winder.step(&Actuators {
             torque: row.torque.map(R::of),
             brakes: row.brakes,
             ..Actuators::default()
         });
+        let now = Incidents::of(&winder);
+        if now != before {
+            let time = seconds(step);
+            let events = now.since(&before).map(|what| format!("{time} s: {what}"));
+            let room = MOST_EVENTS.saturating_sub(run.events.len());
+            run.events.extend(events.take(room));
+            before = now;
+        }
         if step.is_multiple_of(every) {
             write_row(out, step, &winder)?;
         }
     }
-    Ok(schedule.end() / every + 1)
+    Ok(run)
 }
 
 /// The columns of the output: speeds of the rolls, tensions of the spans behind them, radii.
@@ -343,6 +404,11 @@ fn stall_tension(machine: &Machine) -> f64 {
     machine.operation.stall_share * machine.operation.tension_n_m * machine.web.width_m
 }
 
+/// The time of a step, s.
+fn seconds(step: u64) -> f64 {
+    (step * u64::from(PLANT_PERIOD_MS)) as f64 / 1e3
+}
+
 /// One row of the output. `Debug` gives the shortest digits that read back as the same number.
 fn write_row<R: Real, const SPANS: usize>(
     out: &mut dyn Write,
@@ -351,8 +417,7 @@ fn write_row<R: Real, const SPANS: usize>(
 ) -> io::Result<()> {
     let (x, t) = (winder.state(), winder.tension());
     let v_uw = x.omega_uw * x.r_uw;
-    let seconds = (step * u64::from(PLANT_PERIOD_MS)) as f64 / 1e3;
-    write!(out, "{seconds:?},{v_uw:?}")?;
+    write!(out, "{:?},{v_uw:?}", seconds(step))?;
     for value in x.v.into_iter().chain(t).chain([x.r_uw, x.r_wu]) {
         write!(out, ",{value:?}")?;
     }
@@ -466,5 +531,22 @@ mod tests {
             let error = output_period(every_s).unwrap_err().to_string();
             assert!(error.starts_with(&format!("--every {every_s} ")), "{error}");
         }
+    }
+
+    #[test]
+    fn what_happens_to_web_and_roll_is_told_with_its_time() {
+        let mut machine = Machine::news_8000();
+        machine.nips.slip = true;
+        machine.nips.friction = 0.05;
+        let schedule = read(&format!(
+            "{HEADER}\n0,0,180,180,0\n1,4000,180,3400,0\n9,0,0,9e5,0\n10,0,0,0,0"
+        ));
+        let run = simulate::<f64>(&machine, &schedule.unwrap(), 250, &mut io::sink()).unwrap();
+        assert_eq!(run.rows, 11);
+        let told = |what: &str| run.events.iter().find(|event| event.ends_with(what));
+        let slip = told("the front drum loses traction").unwrap();
+        let time: f64 = slip.split(' ').next().unwrap().parse().unwrap();
+        assert!((1.0..1.2).contains(&time), "{slip}");
+        assert!(run.events.len() <= MOST_EVENTS);
     }
 }
