@@ -17,4 +17,5 @@ pub mod machine;
 pub mod plant;
 pub mod profidrive;
 pub mod real;
+pub mod signal;
 pub mod simulator;

@@ -3,7 +3,7 @@
 //! Not here: jogging, and the words of positioning mode. Bits 0–10 only; they also match the ABB Drives
 //! profile. Source: PROFIdrive profile 4.2 (PNO 3.172), STW1, ZSW1 and the general state machine.
 
-use crate::image::Bit;
+use crate::signal::Bit;
 
 /// Control word 1, from the PLC to a drive.
 pub mod stw1 {

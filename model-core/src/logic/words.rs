@@ -1,6 +1,6 @@
 //! Command and status words of the winder, and the codes of modes, refusals and faults.
 
-use crate::image::Bit;
+use crate::signal::Bit;
 
 /// Bits of the winder's command word.
 pub mod command {

@@ -8,12 +8,12 @@ use embassy_net::tcp::TcpSocket;
 use embassy_net::{Config, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::{Duration, with_timeout};
+use firmware::link::ImageCell;
 use firmware::link::modbus::tcp::{End, Timeouts, session};
 use firmware::link::seats::Seats;
 use static_cell::StaticCell;
 
 use crate::lan9118::Lan9118;
-use crate::simulator::LocalImage;
 
 /// The first guest's address on QEMU's user network; QEMU forwards a port of the host to it.
 const ADDRESS: Ipv4Cidr = Ipv4Cidr::new(Ipv4Address::new(10, 0, 2, 15), 24);
@@ -35,6 +35,9 @@ const KEEP_ALIVE: Duration = Duration::from_secs(5);
 const TIMEOUT: Duration = Duration::from_secs(15);
 /// The time for the last bytes of a connection to get through.
 const CLOSING: Duration = Duration::from_secs(2);
+
+/// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
+pub type LocalImage = ImageCell<NoopRawMutex>;
 
 type Places = Seats<NoopRawMutex, MODBUS_CLIENTS>;
 

@@ -8,7 +8,6 @@
 use core::cell::RefCell;
 
 use embassy_executor::Spawner;
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::journal::Journal;
 use firmware::link::ImageCell;
@@ -21,8 +20,7 @@ use model_core::machine::Machine;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
-/// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
-pub type LocalImage = ImageCell<NoopRawMutex>;
+use crate::net::LocalImage;
 
 /// What the tasks share, made once.
 pub fn exchange() -> &'static Exchange {
