@@ -163,12 +163,12 @@ impl<const N: usize> Block<N> {
     /// The value in the signal's unit, within its limits.
     pub fn get<R: Real>(&self, signal: &Signal) -> R {
         let raw = match signal.kind {
-            Kind::I16 => f64::from(self.word(signal) as i16),
-            Kind::U32 => f64::from(self.double(signal)),
-            _ => f64::from(self.word(signal)),
+            Kind::I16 => f32::from(self.word(signal) as i16),
+            Kind::U32 => self.double(signal) as f32,
+            _ => f32::from(self.word(signal)),
         };
         let (low, high) = signal.limits;
-        R::of((raw / f64::from(signal.counts)).clamp(f64::from(low), f64::from(high)))
+        R::of_f32((raw / signal.counts).clamp(low, high))
     }
 
     /// Sets the word as it travels.
@@ -184,20 +184,25 @@ impl<const N: usize> Block<N> {
     }
 
     /// Sets the value, in the signal's unit, to the nearest count within its limits.
+    ///
+    /// Words are computed in `f32`, which holds every count of them; the counts of a 32-bit signal need `f64`.
     pub fn set<R: Real>(&mut self, signal: &Signal, value: R) {
         let (low, high) = signal.limits;
-        let value =
-            value.to_f64().clamp(f64::from(low), f64::from(high)) * f64::from(signal.counts);
-        // half away from zero; the cast saturates, and takes NaN to 0
-        let rounded = if value < 0.0 {
-            value - 0.5
-        } else {
-            value + 0.5
-        };
+        // half away from zero; the casts saturate, and take NaN to 0
         match signal.kind {
-            Kind::I16 => self.set_word(signal, rounded as i16 as u16),
-            Kind::U32 => self.set_double(signal, rounded as u32),
-            _ => self.set_word(signal, rounded as u16),
+            Kind::U32 => {
+                let value = value.to_f64().clamp(f64::from(low), f64::from(high));
+                self.set_double(signal, (value * f64::from(signal.counts) + 0.5) as u32);
+            }
+            Kind::I16 => {
+                let counts = value.to_f32().clamp(low, high) * signal.counts;
+                let half = if counts < 0.0 { -0.5 } else { 0.5 };
+                self.set_word(signal, (counts + half) as i16 as u16);
+            }
+            _ => {
+                let counts = value.to_f32().clamp(low, high) * signal.counts;
+                self.set_word(signal, (counts + 0.5) as u16);
+            }
         }
     }
 }

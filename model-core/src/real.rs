@@ -34,6 +34,10 @@ pub trait Real:
     fn of(x: f64) -> Self;
     /// The number as `f64`, exactly or nearest.
     fn to_f64(self) -> f64;
+    /// The nearest number to an `f32`, which is cheap on a microcontroller.
+    fn of_f32(x: f32) -> Self;
+    /// The nearest `f32`.
+    fn to_f32(self) -> f32;
     /// √x, correctly rounded; of a negative number, NaN.
     fn sqrt(self) -> Self;
     /// cos x, of an angle within ±2·π; the same bits on every machine.
@@ -137,6 +141,12 @@ impl Real for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
+    fn of_f32(x: f32) -> Self {
+        x
+    }
+    fn to_f32(self) -> f32 {
+        self
+    }
     fn sqrt(self) -> Self {
         libm::sqrtf(self)
     }
@@ -168,6 +178,12 @@ impl Real for f64 {
     }
     fn to_f64(self) -> f64 {
         self
+    }
+    fn of_f32(x: f32) -> Self {
+        f64::from(x)
+    }
+    fn to_f32(self) -> f32 {
+        self as f32
     }
     fn sqrt(self) -> Self {
         libm::sqrt(self)

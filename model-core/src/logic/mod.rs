@@ -194,8 +194,12 @@ impl<R: Real> Logic<R> {
         let words = control_words(sight.commands).into_array();
         let by_section = words.iter().any(|w| w & stw1::ACKNOWLEDGE != 0);
         let now = by_section || self.commanded(sight, command::ACKNOWLEDGE);
-        if now && !self.last_acknowledge && sight.standstill {
-            self.fault = Fault::None;
+        if now && !self.last_acknowledge && self.fault != Fault::None {
+            if sight.standstill {
+                self.fault = Fault::None;
+            } else {
+                self.refusal = Refusal::NotAtStandstill;
+            }
         }
         self.last_acknowledge = now;
     }
