@@ -1,8 +1,9 @@
 //! The numbers the models compute with, and sums that lose nothing.
 //!
-//! Not here: units, conversions, transcendental functions. A step uses `+ − × ÷`, comparison and, in the
-//! references, a square root; each is correctly rounded on every machine, nothing is fused, so the same inputs
-//! give the same bits on a PC and on a microcontroller.
+//! Not here: units, conversions, transcendental functions. A step uses `+ − × ÷`, comparison, a square
+//! root in references and nips, and a cosine where a roll is eccentric. The first are correctly rounded on every
+//! machine, the last two come from one library in software, and nothing is fused: the same inputs give the same bits
+//! on a PC and on a microcontroller.
 
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};

@@ -118,11 +118,12 @@ impl<R: Real> Nips<R> {
             + w.force_gain * front_force * w.per_width
     }
 
-    /// z_eff/z = 1 − κ·(WOT/WOT_ref − 1); 1 where layers do not compress.
+    /// z_eff/z = 1 − κ·(WOT/WOT_ref − 1), within a half and one and a half; 1 where layers do not compress.
     pub fn thickness(&self, wound_on_tension: R) -> R {
         let w = &self.wound_on;
         if w.compresses {
-            R::ONE - w.hardness * (wound_on_tension * w.per_reference - R::ONE)
+            let tightness = wound_on_tension * w.per_reference - R::ONE;
+            R::ONE - (w.hardness * tightness).limit(R::of(0.5))
         } else {
             R::ONE
         }

@@ -77,7 +77,8 @@ impl<R: Real> Sensors<R> {
 
     /// One look, every step of the plant.
     ///
-    /// The load cells carry F = (t_before + t_after)·sin(β/2) + tare and show F/(2·sin(β_cal/2)), filtered.
+    /// The load cells carry F = (t_before + t_after)·sin(β/2) + tare and show F/(2·sin(β_cal/2)), filtered. Where
+    /// they do not feel both spans, t_after stands for t_before.
     pub fn look<const SPANS: usize>(
         &mut self,
         sight: &Sight<R>,

@@ -57,7 +57,7 @@ pub struct ShippingRoll<R> {
 }
 
 impl<R: Real> ShippingRoll<R> {
-    /// (J_wu/R_wu²)·(Ṙ_wu/R_wu): the paper that arrives brings its speed along, kg/s.
+    /// (J_wu/R_wu²)·(Ṙ_wu/R_wu), kg/s: at one surface speed a roll that grows turns slower, {13}.
     #[inline(always)]
     fn growth(&self) -> R {
         self.mass * (self.radius_rate * self.per_radius)
