@@ -148,8 +148,8 @@ pub fn steady_tensions(m: &Machine, v: f64, t_gr: f64) -> [f64; 3] {
 
 /// Torques that accelerate all surfaces by `a` [m/s²] with `t_gr` in the measured span.
 ///
-/// The parent roll also speeds up as its radius falls, ω̇ = (a − ω·Ṙ)/R, and the paper that arrives pushes the
-/// shipping roll.
+/// The parent roll also speeds up as its radius falls, ω̇ = (a − ω·Ṙ)/R, and a growing shipping roll turns slower at
+/// one surface speed.
 pub fn torques(m: &Machine, x: &State<f64, 3>, t_gr: f64, a: f64) -> BySection<f64> {
     let idle = |i: usize| m.idle[i].friction_n_s_m * x.v[i] + idle_mass(m, i) * a;
     let (t_uw, t_sr) = (t_gr - idle(0), t_gr + idle(1));
