@@ -366,6 +366,12 @@ fn simulate_spans<R: Real, const SPANS: usize>(
         rows: schedule.end() / every + 1,
         events: Vec::new(),
     };
+    if winder.substeps() > 1 {
+        let note = "light rolls or short spans make the web too fast for one";
+        let steps = winder.substeps();
+        run.events
+            .push(format!("{steps} steps of integration in 4 ms: {note}"));
+    }
     let mut before = Incidents::of(&winder);
     for (step, row) in (1_u64..).zip(schedule.steps()) {
         winder.step(&Actuators {

@@ -1,10 +1,11 @@
 //! Small-signal modes of the web and the rolls, as eigenvalues of the linearised winder.
 
-use model_core::machine::Machine;
+use model_core::machine::{Machine, PRESETS};
+use model_core::plant::modes::{fastest, substeps};
 use model_core::plant::rk4::State;
 use nalgebra::{Complex, DMatrix};
 
-use crate::form::{self, Bench, RUN};
+use crate::form::{self, Bench, H, RUN};
 use crate::near;
 
 /// A step so small that the step's own error does not show, s.
@@ -95,5 +96,93 @@ fn the_lowest_mode_is_damped_by_half_at_full_speed_and_hardly_at_thread_speed() 
     ] {
         let (_, ratio) = held(v)[0];
         near("damping ratio", ratio, damping, tolerance);
+    }
+}
+
+/// ω of the fastest mode of the elastic web: the largest eigenvalue of M⁻¹·K as a symmetric matrix.
+fn fastest_elastic(m: &Machine) -> f64 {
+    let roll = &m.parent_roll;
+    let parent = |r: f64| form::parent_inertia(m, r) / (r * r);
+    let lightest = parent(roll.expire_radius_m).min(parent(roll.full_radius_m));
+    let idle = (0..m.idle.len()).map(|i| form::idle_mass(m, i));
+    let drums = form::windup_mass(m, m.shipping_roll.core_radius_m);
+    let masses: Vec<f64> = [lightest].into_iter().chain(idle).chain([drums]).collect();
+    let lengths = m.idle.iter().map(|roll| roll.span_m);
+    let mut k = DMatrix::<f64>::zeros(masses.len(), masses.len());
+    for (i, length) in lengths.chain([m.last_span_m]).enumerate() {
+        let spring = form::stiffness(m) / length;
+        for (row, column, sign) in [
+            (i, i, 1.0),
+            (i + 1, i + 1, 1.0),
+            (i, i + 1, -1.0),
+            (i + 1, i, -1.0),
+        ] {
+            k[(row, column)] += sign * spring / (masses[row] * masses[column]).sqrt();
+        }
+    }
+    k.symmetric_eigenvalues().max().sqrt()
+}
+
+#[test]
+fn the_fastest_mode_of_every_preset_is_followed_in_one_step() {
+    for (name, preset) in PRESETS {
+        let m = preset();
+        let (omega, expected) = (fastest(&m), fastest_elastic(&m));
+        near(name, omega, expected, 1e-5 * expected);
+        assert_eq!(substeps(&m, H), 1, "{name}");
+        assert!(omega * H < 0.8, "{name}: {omega} rad/s");
+    }
+    near(
+        "unlumped",
+        fastest(&Machine::news_8000_unlumped()),
+        179.0,
+        1.0,
+    );
+}
+
+/// A web that only creeps: |λ| is the root of λ² + τ·ω²·λ + ω², and tends to τ·ω².
+#[test]
+fn a_creeping_mode_is_as_fast_as_its_damping_makes_it() {
+    let mut m = Machine::news_8000();
+    m.idle[1].inertia_kg_m2 = 0.01;
+    let omega = fastest_elastic(&m);
+    let damped = m.web.retardation_s * omega * omega;
+    let root = fastest(&m);
+    near(
+        "λ² + τ·ω²·λ + ω²",
+        root * root - damped * root,
+        -omega * omega,
+        1e-3 * omega * omega,
+    );
+    assert!(root > 0.9 * damped, "{root} of {damped}");
+}
+
+/// Rolls as light as that would tear the web apart by the integration alone; in smaller steps they are followed as
+/// a fifty times finer integration does.
+#[test]
+fn a_machine_that_is_too_fast_for_its_step_takes_smaller_ones() {
+    let mut m = Machine::news_8000();
+    for roll in &mut m.idle {
+        roll.inertia_kg_m2 *= 0.01;
+    }
+    let steps = substeps(&m, H);
+    assert!(steps > 1 && fastest(&m) * H / f64::from(steps) <= 0.8);
+    let x = form::steady(&m, 10.0, 2800.0, 1.5, 0.05);
+    let torque = form::torques(&m, &x, 2800.0, 0.3);
+    let run = |h: f64| {
+        let mut bench = Bench::<f64>::with_step(m.clone(), h);
+        bench.winder.thread_at(0.0);
+        bench.set(&x);
+        for _ in 0..(2.0 / h).round() as u32 {
+            bench.step(&torque);
+        }
+        (bench.x(), bench.t(), bench.winder.substeps())
+    };
+    let (coarse, t, taken) = run(H);
+    let (fine, t_fine, _) = run(H / 50.0);
+    assert_eq!(taken, steps);
+    near("V", coarse.v[2], fine.v[2], 1e-6);
+    for (t, fine) in t.into_iter().zip(t_fine) {
+        near("t", t, fine, 0.05);
     }
 }

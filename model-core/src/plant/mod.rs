@@ -8,6 +8,7 @@
 
 pub mod eccentricity;
 pub mod friction;
+pub mod modes;
 pub mod nip;
 pub mod rk4;
 pub mod roll;
@@ -40,6 +41,7 @@ const BARE: f64 = 0.99;
 #[derive(Clone, Debug)]
 pub struct Winder<R: Real, const SPANS: usize> {
     coefficients: Coefficients<R, SPANS>,
+    substeps: u32,
     state: State<R::Sum, SPANS>,
     /// Strain rates and tensions that belong to the state.
     web: Web<R, SPANS>,
@@ -123,9 +125,12 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
                 high: rolls,
             });
         }
-        let coefficients = Coefficients::new(machine, h);
+        let substeps = modes::substeps(machine, h);
+        let step = h / f64::from(substeps);
+        let coefficients = Coefficients::new(machine, step);
         let zero = R::Sum::at(R::ZERO);
         Ok(Self {
+            substeps,
             state: State {
                 strain: [zero; SPANS],
                 v: [zero; SPANS],
@@ -144,7 +149,7 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
                 wound_on_tension: R::of(machine.wound_on_tension.reference_n_m),
                 ..Winding::default()
             },
-            eccentricity: Eccentricity::new(machine, h),
+            eccentricity: Eccentricity::new(machine, step),
             sensors: Sensors::new(machine, h),
             coefficients,
         })
@@ -158,9 +163,18 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
             rd: self.delay.rd.step(actuators.brakes.rd),
             fd: self.delay.fd.step(actuators.brakes.fd),
         };
-        self.advance(actuators);
-        self.break_web_if_due();
+        self.state.travel = R::Sum::at(R::ZERO);
+        for _ in 0..self.substeps {
+            self.advance(actuators);
+            self.break_web_if_due();
+        }
         self.measure()
+    }
+
+    /// Steps of integration in one step of the winder: more than one where light rolls or short spans make a
+    /// mode of the web too fast for it.
+    pub fn substeps(&self) -> u32 {
+        self.substeps
     }
 
     /// Puts the web under the same tension in all spans, in N, the machine as it stands.
@@ -230,9 +244,8 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         self.web = self.coefficients.web(&self.state(), &Offsets::NONE);
     }
 
-    /// Moves everything by h, the friction of brakes and nips as the step found it.
+    /// Moves everything by a step of integration, the friction of brakes and nips as it found it.
     fn advance(&mut self, actuators: &Actuators<R>) {
-        self.state.travel = R::Sum::at(R::ZERO);
         let x = self.state.map(|sum| sum.value());
         let offsets = self.eccentricity.turn(&x);
         if self.threaded && self.eccentricity.present() {
