@@ -73,7 +73,7 @@ fn radii_follow_the_length<R: Real>() {
 /// M at the core and at 1.25 m, and as a step of the winder shows it: M = F·h/ΔV.
 fn mass_of_the_windup_is_that_of_its_rolls<R: Real>() {
     let m = Machine::news_8000();
-    let windup = Windup::<R>::new(&m);
+    let windup = Windup::<R>::new(&m, H);
     for (r, mass) in [(0.05, 15_061.0), (0.625, 18_459.0)] {
         let core = windup
             .mass(&windup.shipping_roll(R::of(r), R::ZERO))

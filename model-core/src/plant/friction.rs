@@ -100,6 +100,17 @@ impl<R: Real> Brake<R> {
         }
     }
 
+    /// The friction on a body that moves at `v`.
+    pub fn against(&self, v: R) -> R {
+        if v > R::ZERO {
+            self.sliding
+        } else if v < R::ZERO {
+            -self.sliding
+        } else {
+            R::ZERO
+        }
+    }
+
     /// The friction on a body of inertia M and speed V, under the external force F_ext (viscous friction
     /// included) at the start of the step.
     #[inline(always)]

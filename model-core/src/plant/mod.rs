@@ -292,7 +292,7 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         }
     }
 
-    /// What the nips can carry in this step, where they may let go; what slides is pulled with that.
+    /// What the nips can carry in this step, where they may let go.
     fn load_nips(&mut self, r_wu: R) -> Option<Traction<R>> {
         let c = &self.coefficients;
         if c.winds() {
@@ -301,15 +301,9 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         if !c.slips {
             return None;
         }
-        let sliding = c.nips.traction(&self.winding.nip_load);
-        for (nip, pull) in self.nips.iter_mut().zip(sliding) {
-            if let Nip::Slides(force) = nip {
-                *force = if *force < R::ZERO { -pull } else { pull };
-            }
-        }
         Some(Traction {
             sticking: c.nips.static_traction(&self.winding.nip_load),
-            sliding,
+            sliding: c.nips.traction(&self.winding.nip_load),
         })
     }
 
@@ -460,7 +454,7 @@ impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
             ),
             idle: core::array::from_fn(|i| roll(i).map(Idle::new)),
             unwind: Unwind::new(machine),
-            windup: Windup::new(machine),
+            windup: Windup::new(machine, h),
             nips: Nips::new(machine),
             slips: machine.nips.slip,
             rk4: Rk4::new(h),

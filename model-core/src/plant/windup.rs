@@ -43,6 +43,8 @@ pub struct Windup<R> {
     /// 1/R of each roll, 1/m.
     per_radius: [R; ROLLS],
     least_mass: R,
+    /// 1/h, 1/s.
+    per_step: R,
 }
 
 /// The shipping roll at one radius.
@@ -122,6 +124,7 @@ impl<R: Real> Holding<R> {
             nip_force: [R::ZERO; ROLLS],
             roll_stops: false,
             stops: [false; ROLLS],
+            meets: [false; ROLLS],
         }
     }
 
@@ -165,6 +168,8 @@ pub struct Holding<R> {
     roll_stops: bool,
     /// The brake of a sliding roll brings it to rest.
     stops: [bool; ROLLS],
+    /// The slip of a sliding roll ends within the step.
+    meets: [bool; ROLLS],
 }
 
 /// What the nips can carry, N.
@@ -177,8 +182,8 @@ pub struct Traction<R> {
 }
 
 impl<R: Real> Windup<R> {
-    /// From the machine's description.
-    pub fn new(machine: &Machine) -> Self {
+    /// From the machine's description, in steps of `h` seconds.
+    pub fn new(machine: &Machine, h: f64) -> Self {
         let rolls = [&machine.rear_drum, &machine.front_drum, &machine.rider_roll];
         let roll = &machine.shipping_roll;
         Self {
@@ -194,6 +199,7 @@ impl<R: Real> Windup<R> {
             layer: R::of(machine.web.caliper_m / core::f64::consts::TAU),
             per_radius: rolls.map(|roll| R::of(1.0 / roll.radius_m)),
             least_mass: R::of(LEAST_MASS),
+            per_step: R::of(1.0 / h),
         }
     }
 
@@ -308,8 +314,9 @@ impl<R: Real> Windup<R> {
     /// Decides for one step how brakes and nips hold.
     ///
     /// A brake's force is the one that would bring its body to rest by the end of the step, as far as it can; the
-    /// brakes of rolls that stick together share it by what they can give. Then every sticking nip is asked for
-    /// the force that it needs: the one that is furthest beyond its traction lets go, until none is.
+    /// brakes of rolls that stick together share it by what they can give. The force of a sliding nip is, in the
+    /// same way, the one that would end its slip, as far as its traction goes. Then every sticking nip is asked
+    /// for the force that it needs: the one that is furthest beyond its traction lets go, until none is.
     pub fn hold(
         &self,
         v: &Speeds<R>,
@@ -319,8 +326,13 @@ impl<R: Real> Windup<R> {
         brakes: &[Brake<R>; ROLLS],
         traction: Option<&Traction<R>>,
     ) -> Holding<R> {
+        let meets = match traction {
+            Some(traction) => self.catch(v, roll, t_sr, &mut parts, brakes, traction),
+            None => [false; ROLLS],
+        };
         loop {
-            let holding = self.hold_with(v, roll, t_sr, parts, brakes);
+            let mut holding = self.hold_with(v, roll, t_sr, parts, brakes);
+            holding.meets = meets;
             let Some(traction) = traction else {
                 return holding;
             };
@@ -336,6 +348,39 @@ impl<R: Real> Windup<R> {
             let forward = holding.nip_force[j] > R::ZERO;
             parts.nips[j] = Nip::Slides(if forward { pull } else { -pull });
         }
+    }
+
+    /// F_j = clamp(m·\[(V_j − V_wu)/h + f_j/m_j − f_wu/m_wu\], ±μ·N·W) of the sliding nips one after the other, with
+    /// the reduced mass m: each takes relative speed away and can never turn it over. Tells which end their slip.
+    fn catch(
+        &self,
+        v: &Speeds<R>,
+        roll: &ShippingRoll<R>,
+        t_sr: R,
+        parts: &mut Parts<R>,
+        brakes: &[Brake<R>; ROLLS],
+        traction: &Traction<R>,
+    ) -> [bool; ROLLS] {
+        let forces = self.forces(v, roll, t_sr, &parts.drive);
+        for nip in &mut parts.nips {
+            if let Nip::Slides(force) = nip {
+                *force = R::ZERO;
+            }
+        }
+        core::array::from_fn(|j| {
+            if parts.nips[j] == Nip::Sticks {
+                return false;
+            }
+            let body = self.body(&forces, roll, &parts.nips);
+            let reduced = self.mass[j] * (body.mass / (self.mass[j] + body.mass));
+            let own = forces.rolls[j] - brakes[j].against(v.rolls[j]);
+            let approach = own / self.mass[j] - body.force / body.mass;
+            let slip = v.rolls[j] - v.wu;
+            let needed = reduced * (slip * self.per_step + approach);
+            let pull = traction.sliding[j];
+            parts.nips[j] = Nip::Slides(needed.limit(pull));
+            needed.abs() < pull
+        })
     }
 
     fn hold_with(
@@ -377,6 +422,7 @@ impl<R: Real> Windup<R> {
             nip_force,
             roll_stops: common.sticks,
             stops,
+            meets: [false; ROLLS],
         }
     }
 
@@ -399,7 +445,7 @@ impl<R: Real> Windup<R> {
                 continue;
             };
             let slip = v.rolls[j] - v.wu;
-            if slip * force > R::ZERO {
+            if slip * force > R::ZERO && !holding.meets[j] {
                 continue;
             }
             let stuck = (0..ROLLS).filter(|i| nips[*i] == Nip::Sticks);
