@@ -1,4 +1,4 @@
-//! `board-host [--port N]`: serves until Ctrl-C or SIGTERM.
+//! `board_host [--port N]`: serves until Ctrl-C or SIGTERM.
 
 use std::env;
 use std::process::ExitCode;
@@ -16,7 +16,7 @@ fn main() -> ExitCode {
     match port(env::args().skip(1)).and_then(|port| run(port).map_err(|error| error.to_string())) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("board-host: {error}");
+            eprintln!("board_host: {error}");
             ExitCode::FAILURE
         }
     }
@@ -28,7 +28,7 @@ fn port(mut arguments: impl Iterator<Item = String>) -> Result<u16, String> {
     };
     match (option.as_str(), arguments.next(), arguments.next()) {
         ("--port", Some(port), None) => port.parse().map_err(|_| format!("no such port: {port}")),
-        _ => Err("usage: board-host [--port N]".into()),
+        _ => Err("usage: board_host [--port N]".into()),
     }
 }
 

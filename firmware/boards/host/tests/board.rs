@@ -85,7 +85,7 @@ fn a_port_that_is_taken_is_an_error() {
 #[test]
 fn the_program_says_where_it_is_and_ends_on_a_signal() {
     for signal in ["-INT", "-TERM"] {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_board-host"))
+        let mut program = Command::new(env!("CARGO_BIN_EXE_board_host"))
             .args(["--port", "0"])
             .stdout(Stdio::piped())
             .spawn()
