@@ -142,21 +142,23 @@ impl<R: Real> Unwind<R> {
         let square = task.r * task.r;
         let mass = (c.inertia_offset + c.inertia_factor * (square * square)) / square;
         let limit = c.motor.limit(m.omega.uw, task.limit) / task.r;
+        let v = m.omega.uw * task.r;
         let roll = Roll {
+            entered: task.control != self.control,
+            v,
             mass,
             mode: (c.web_stiffness / mass).sqrt(),
             // to raise the tension the unwind must run a little slower than the web
-            error: m.omega.uw * task.r - task.v + task.tension_rate / c.web_stiffness,
+            error: v - task.v + task.tension_rate / c.web_stiffness,
             limit,
         };
         self.slow_error += c.washout * (roll.error - self.slow_error);
-        let entered = task.control != self.control;
         self.control = task.control;
         let force = match task.control {
             UnwindControl::Off => R::ZERO,
-            UnwindControl::TakeUp => self.take_up(task, m, &roll, entered),
-            UnwindControl::Tension => self.hold_tension(task, m, &roll, entered),
-            UnwindControl::Speed => self.hold_speed(task, m, &roll, entered),
+            UnwindControl::TakeUp => self.take_up(task, m, &roll),
+            UnwindControl::Tension => self.hold_tension(task, m, &roll),
+            UnwindControl::Speed => self.hold_speed(task, m, &roll),
         };
         self.at_limit = force.abs() >= limit;
         self.torque = force.limit(limit) * task.r;
@@ -168,19 +170,13 @@ impl<R: Real> Unwind<R> {
     /// `path` is what the idle rolls before the load cells take: their inertia and friction are compensated as
     /// the roll's own. The damping acts on the fast part of the unwind's speed error and fades as the web's own
     /// transport takes over.
-    fn hold_tension(
-        &mut self,
-        task: &UnwindTask<R>,
-        m: &Measurements<R>,
-        roll: &Roll<R>,
-        entered: bool,
-    ) -> R {
+    fn hold_tension(&mut self, task: &UnwindTask<R>, m: &Measurements<R>, roll: &Roll<R>) -> R {
         let c = &self.c;
         let path = c.path_mass * task.a_ref + c.path_friction * task.v_ref;
         let open_loop = self.feed_forward(task, m, roll) + path - task.tension_ref;
         let error = task.tension_ref - m.tension;
         let bound = c.trim_limit / task.r;
-        if entered {
+        if roll.entered {
             // bumpless: the trim takes up where the torque stands
             let trim = open_loop - self.torque / task.r;
             self.tension
@@ -196,15 +192,9 @@ impl<R: Real> Unwind<R> {
 
     /// Turns a little slower than the web, so that slack is taken up, and holds the web with no more than the
     /// tension reference once it is tight.
-    fn take_up(
-        &mut self,
-        task: &UnwindTask<R>,
-        m: &Measurements<R>,
-        roll: &Roll<R>,
-        entered: bool,
-    ) -> R {
+    fn take_up(&mut self, task: &UnwindTask<R>, m: &Measurements<R>, roll: &Roll<R>) -> R {
         let c = &self.c;
-        self.draw = if entered {
+        self.draw = if roll.entered {
             R::ZERO
         } else {
             self.draw + c.draw_rate
@@ -212,56 +202,28 @@ impl<R: Real> Unwind<R> {
         let draw = (self.draw * task.v_ref.abs()).max(c.least_draw);
         let feed_forward = self.feed_forward(task, m, roll);
         let low = (feed_forward - task.tension_ref).max(-roll.limit);
-        self.regulate_speed(
-            task.v_ref - draw,
-            m.omega.uw * task.r,
-            feed_forward,
-            low,
-            roll,
-            entered,
-        )
+        self.regulate_speed(task.v_ref - draw, feed_forward, low, roll)
     }
 
     /// Follows the speed reference.
-    fn hold_speed(
-        &mut self,
-        task: &UnwindTask<R>,
-        m: &Measurements<R>,
-        roll: &Roll<R>,
-        entered: bool,
-    ) -> R {
+    fn hold_speed(&mut self, task: &UnwindTask<R>, m: &Measurements<R>, roll: &Roll<R>) -> R {
         let feed_forward = self.feed_forward(task, m, roll);
-        self.regulate_speed(
-            task.v_ref,
-            m.omega.uw * task.r,
-            feed_forward,
-            -roll.limit,
-            roll,
-            entered,
-        )
+        self.regulate_speed(task.v_ref, feed_forward, -roll.limit, roll)
     }
 
     /// Speed regulator by the symmetrical optimum, slowed to a third of the web mode of this radius.
-    fn regulate_speed(
-        &mut self,
-        v_ref: R,
-        v: R,
-        feed_forward: R,
-        low: R,
-        roll: &Roll<R>,
-        entered: bool,
-    ) -> R {
+    fn regulate_speed(&mut self, v_ref: R, feed_forward: R, low: R, roll: &Roll<R>) -> R {
         let c = &self.c;
         let crossover = (roll.mode * R::of(1.0 / 3.0)).min(c.fastest);
         let gains = Gains {
             proportional: c.per_crossover.proportional * crossover * roll.mass,
             integral: c.per_crossover.integral * (crossover * crossover) * roll.mass,
         };
-        if entered {
+        if roll.entered {
             self.speed.reset();
         }
         self.speed
-            .step(&gains, v_ref - v, feed_forward, low, roll.limit)
+            .step(&gains, v_ref - roll.v, feed_forward, low, roll.limit)
     }
 
     /// Inertia, friction and the closed brake: m̂·a* + ĉ·v* + F_brake
@@ -279,6 +241,10 @@ impl<R: Real> Unwind<R> {
 
 /// The parent roll as the drive knows it in this period.
 struct Roll<R> {
+    /// Its control has changed.
+    entered: bool,
+    /// Surface speed, m/s.
+    v: R,
     /// Ĵ/R̂², kg.
     mass: R,
     /// First web mode with the drums held, rad/s.

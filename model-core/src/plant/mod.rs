@@ -28,7 +28,7 @@ use sensors::{Sensors, Sight};
 use span::{Spans, Web};
 use windup::{FRONT, Holding, Nip, Parts, ROLLS, Speeds, Traction, Windup};
 
-/// Period of the plant task and step of its integration, ms.
+/// Period of the plant task and longest step of its integration, ms.
 pub const PLANT_PERIOD_MS: u32 = 4;
 
 /// Strain of a web that has just been led through by hand: 2 mm of loop for each metre.
