@@ -13,11 +13,13 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
-use model_core::image::{self, Commands, Feedback, Kind, Signal};
+use model_core::drive::DRIVE_PERIOD_MS;
+use model_core::image::{self, Commands, Feedback, Image, Kind, Signal};
 use model_core::logic::{Fault, Mode, Refusal, command, status};
 use model_core::machine::Machine;
 use model_core::plant::PLANT_PERIOD_MS;
 use model_core::profidrive::{stw1, zsw1};
+use model_core::simulator::Simulator;
 
 use crate::interrupt;
 use crate::link::Link;
@@ -464,6 +466,35 @@ impl Plc {
             Step::Done => f64::INFINITY,
         }
     }
+}
+
+/// Winds a set on a simulator in this process, both in lockstep: no network, no clock. `meanwhile` sees each
+/// sample, and may do something to the winder.
+///
+/// `machine` is the simulated one, valid and of `SPANS` spans; the recipe has the PLC's idea of it. Fails where the
+/// program does.
+pub fn wind_in_lockstep<const SPANS: usize>(
+    machine: &Machine,
+    recipe: &Recipe,
+    mut meanwhile: impl FnMut(&mut Simulator<f32, SPANS>, &Sample),
+) -> Result<Vec<Sample>, Trouble> {
+    let mut simulator = Simulator::new(machine).expect("a valid machine");
+    let mut image = Image {
+        commands: Commands::of(machine),
+        feedback: Feedback::default(),
+    };
+    let mut plc = Plc::new(recipe.clone());
+    let mut samples = Vec::new();
+    while plc.step() != Step::Done {
+        for _ in 0..(1e3 * CYCLE_S) as u32 / DRIVE_PERIOD_MS {
+            simulator.drive_cycle(&mut image);
+        }
+        let sample = plc.cycle(&image.feedback)?;
+        image.commands = *plc.commands();
+        meanwhile(&mut simulator, &sample);
+        samples.push(sample);
+    }
+    Ok(samples)
 }
 
 /// Winds a set on the simulator at `address`, which runs at `pace` times real time; shows the observer a sample

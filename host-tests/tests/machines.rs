@@ -10,33 +10,11 @@
 use std::f64::consts::PI;
 
 use host_tests::machine_file::Description;
-use host_tests::plc::{CYCLE_S, Plc, Recipe, Sample, Step};
+use host_tests::plc::{Recipe, Step, wind_in_lockstep};
 use host_tests::report::Report;
-use model_core::drive::DRIVE_PERIOD_MS;
-use model_core::image::{self, Commands, Feedback, Image};
+use model_core::image;
 use model_core::machine::{Machine, Motor, PRESETS, Value, parameters};
-use model_core::simulator::Simulator;
 use proptest::prelude::*;
-
-/// Winds a set at run speed: threaded, run, stopped.
-fn wind<const SPANS: usize>(recipe: &Recipe) -> Vec<Sample> {
-    let mut simulator = Simulator::<f32, SPANS>::new(&recipe.machine).unwrap();
-    let mut image = Image {
-        commands: Commands::of(&recipe.machine),
-        feedback: Feedback::default(),
-    };
-    let mut plc = Plc::new(recipe.clone());
-    let mut samples = Vec::new();
-    while plc.step() != Step::Done {
-        for _ in 0..(1e3 * CYCLE_S) as u32 / DRIVE_PERIOD_MS {
-            simulator.drive_cycle(&mut image);
-        }
-        let sample = plc.cycle(&image.feedback);
-        samples.push(sample.unwrap_or_else(|trouble| panic!("{trouble}")));
-        image.commands = *plc.commands();
-    }
-    samples
-}
 
 /// The tension stays within ±10 % of its reference from the first metre of the run to standstill.
 fn holds_its_tension<const SPANS: usize>(name: &str, diameter_m: f64) {
@@ -46,7 +24,8 @@ fn holds_its_tension<const SPANS: usize>(name: &str, diameter_m: f64) {
         diameter_m,
         machine,
     };
-    let samples = wind::<SPANS>(&recipe);
+    let samples = wind_in_lockstep::<SPANS>(&recipe.machine, &recipe, |_, _| ());
+    let samples = samples.unwrap_or_else(|trouble| panic!("{trouble}"));
     let report = Report::of(&recipe, &samples);
     assert!(report.missed().is_empty(), "{name}:\n{report}");
     let moving = samples

@@ -1,9 +1,8 @@
 //! The PLC's program against the simulator's own parts, in lockstep: no network, no clock.
 
-use host_tests::plc::{CYCLE_S, Plc, Recipe, Sample, Step, Trouble};
+use host_tests::plc::{Plc, Recipe, Sample, Trouble, wind_in_lockstep};
 use host_tests::report::Report;
-use model_core::drive::DRIVE_PERIOD_MS;
-use model_core::image::{self, Commands, Feedback, Image};
+use model_core::image::{self, Feedback};
 use model_core::machine::Machine;
 use model_core::simulator::Simulator;
 
@@ -17,26 +16,9 @@ fn wind(recipe: &Recipe) -> Result<Vec<Sample>, Trouble> {
 /// As [`wind`], with something that befalls the winder.
 fn wind_with(
     recipe: &Recipe,
-    mut accident: impl FnMut(&mut Winder, &Sample),
+    accident: impl FnMut(&mut Winder, &Sample),
 ) -> Result<Vec<Sample>, Trouble> {
-    let machine = Machine::news_8000();
-    let mut simulator = Winder::new(&machine).expect("a valid machine");
-    let mut image = Image {
-        commands: Commands::of(&machine),
-        feedback: Feedback::default(),
-    };
-    let mut plc = Plc::new(recipe.clone());
-    let mut samples = Vec::new();
-    while plc.step() != Step::Done {
-        for _ in 0..(1e3 * CYCLE_S) as u32 / DRIVE_PERIOD_MS {
-            simulator.drive_cycle(&mut image);
-        }
-        let sample = plc.cycle(&image.feedback)?;
-        image.commands = *plc.commands();
-        accident(&mut simulator, &sample);
-        samples.push(sample);
-    }
-    Ok(samples)
+    wind_in_lockstep(&Machine::news_8000(), recipe, accident)
 }
 
 fn recipe(diameter_m: f64, speed_m_min: f64) -> Recipe {
