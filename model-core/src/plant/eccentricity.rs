@@ -7,7 +7,7 @@
 
 use super::rk4::State;
 use crate::machine::Machine;
-use crate::real::Real;
+use crate::real::{Arithmetic, Real};
 
 /// Phase from roll to roll, rad: the golden angle, so that no two rolls agree.
 const PHASE: f64 = 2.399_963_229_728_653;
@@ -21,16 +21,20 @@ pub struct Offsets<R, const SPANS: usize> {
     pub rolls: [R; SPANS],
 }
 
-impl<R: Real, const SPANS: usize> Offsets<R, SPANS> {
-    /// Round rolls.
-    pub const NONE: Self = Self {
-        uw: R::ZERO,
-        rolls: [R::ZERO; SPANS],
-    };
+impl<T: Copy, const SPANS: usize> Offsets<T, SPANS> {
+    /// The same in other numbers.
+    pub fn map<U>(&self, mut f: impl FnMut(T) -> U) -> Offsets<U, SPANS> {
+        Offsets {
+            uw: f(self.uw),
+            rolls: self.rolls.map(f),
+        }
+    }
+}
 
+impl<A: Arithmetic, const SPANS: usize> Offsets<A, SPANS> {
     /// Speeds with their deviations.
     #[inline(always)]
-    pub fn added_to(&self, v: &[R; SPANS]) -> [R; SPANS] {
+    pub fn added_to(&self, v: &[A; SPANS]) -> [A; SPANS] {
         core::array::from_fn(|i| v[i] + self.rolls[i])
     }
 }
@@ -98,9 +102,6 @@ impl<R: Real, const SPANS: usize> Eccentricity<R, SPANS> {
 
     /// The deviations of the step that starts at `x`.
     pub fn turn(&mut self, x: &State<R, SPANS>) -> Offsets<R, SPANS> {
-        if !self.present {
-            return Offsets::NONE;
-        }
         Offsets {
             uw: self.uw.turn(x.omega_uw, self.period),
             rolls: core::array::from_fn(|i| {
