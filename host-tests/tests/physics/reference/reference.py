@@ -367,7 +367,7 @@ class Winder:
         y[self.R], y[self.RWU] = m["uw"]["full"], m["wu"]["core"]
         tick = 0
         shown = {*range(0, last, every), last} | {
-            round(row[0] / TICK) + k for row in rows[:-1] if dense for k in AFTER
+            tick + k for tick in ticks[:-1] if dense for k in AFTER
         }
         while True:
             if tick in shown:
@@ -444,8 +444,9 @@ def write(path, header, rows):
 def table(name, machine, every, dense):
     winder = Winder(MACHINES[machine])
     rows = []
-    for t, y in winder.run(read(HERE / f"{name}.csv"), every, dense, lambda t, what: print(f"{name} {t:.6f} s: {what}")):
-        n = winder.n
+    n = winder.n
+    schedule = read(HERE / f"{name}.csv")
+    for t, y in winder.run(schedule, every, dense, lambda t, what: print(f"{name} {t:.6f} s: {what}")):
         rows.append([round(t, 3), y[winder.W] * y[winder.R], *y[n : 2 * n], *winder.tensions(y), y[winder.R],
                      y[winder.RWU], y[winder.FD], y[winder.RR], y[winder.WU]])
     write(HERE / f"{name}.table.csv", columns(winder.n), rows)
