@@ -19,7 +19,9 @@ pub mod span;
 pub mod units;
 pub mod windup;
 
-use crate::exchange::{Actuators, Brakes, BySection, Measurements};
+use crate::exchange::{
+    Actuators, Brakes, BySection, MachineFaults, Measurements, SensorFaults,
+};
 use crate::machine::{Machine, MachineError};
 use crate::real::{Accumulator, Real, Ring, Scalar};
 use contact::{Contact, Holding, ParentRoll, Traction};
@@ -179,17 +181,18 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     /// One step of h: what people do, the brakes, the motion, the web's strength, the sensors.
     pub fn step(&mut self, actuators: &Actuators<R::Si>) -> Measurements<R::Si> {
         self.handle(actuators);
+        let (brakes, stuck) = (actuators.brakes, actuators.faults.machine.brakes);
         self.closed = Brakes {
-            uw: self.delay.uw.step(actuators.brakes.uw),
-            rd: self.delay.rd.step(actuators.brakes.rd),
-            fd: self.delay.fd.step(actuators.brakes.fd),
+            uw: stuck.uw.acts_on(self.delay.uw.step(brakes.uw)),
+            rd: stuck.rd.acts_on(self.delay.rd.step(brakes.rd)),
+            fd: stuck.fd.acts_on(self.delay.fd.step(brakes.fd)),
         };
         self.state.travel = R::Sum::at(R::ZERO);
         for _ in 0..self.substeps {
             self.advance(actuators);
             self.break_web_if_due();
         }
-        self.measure()
+        self.measure(&actuators.faults.sensors)
     }
 
     /// Steps of integration in one step of the winder: more than one where light rolls or short spans make a
@@ -278,9 +281,30 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         if handling.new_parent_roll {
             self.state.r_uw = R::Sum::at(limits.full_radius);
         }
-        if handling.thread_web && !self.threaded {
-            self.thread_with(limits.threaded_strain);
+        let strain = limits.threaded_strain;
+        if handling.remove_web {
+            self.break_web();
         }
+        if handling.thread_web && !self.threaded {
+            self.thread_with(strain);
+        }
+        self.suffer(&actuators.faults.machine);
+    }
+
+    /// The faults that a test puts into the machine.
+    fn suffer(&mut self, faults: &MachineFaults<R::Si>) {
+        if faults.parent_roll_expired {
+            self.state.r_uw = R::Sum::at(self.limits.expire_radius);
+        }
+        if faults.web_break > 0 && self.threaded {
+            self.break_web();
+        }
+        // drums once worn may slip from then on; a nip that sticks computes what a whole windup does
+        if self.holders.nips.wear(faults.drum_wear) && !self.holders.slips {
+            self.holders.slips = true;
+            self.apart = [self.state.v[SPANS - 1]; ROLLS];
+        }
+        self.eccentricity.add_to_parent_roll(faults.eccentricity);
     }
 
     fn thread_with(&mut self, strain: R) {
@@ -504,7 +528,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         }
     }
 
-    fn measure(&mut self) -> Measurements<R::Si> {
+    fn measure(&mut self, faults: &SensorFaults<R::Si>) -> Measurements<R::Si> {
         let (x, scale) = (&self.state, &self.scale);
         let speed = |sum: &R::Sum| sum.value().to_si(scale.speed);
         let v_rd = speed(&x.v[SPANS - 1]);
@@ -521,7 +545,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let tension = self.tension();
         Measurements {
             brakes: self.closed,
-            ..self.sensors.look(&sight, &tension)
+            ..self.sensors.look(&sight, &tension, faults)
         }
     }
 }
