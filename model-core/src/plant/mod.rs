@@ -19,9 +19,7 @@ pub mod span;
 pub mod units;
 pub mod windup;
 
-use crate::exchange::{
-    Actuators, Brakes, BySection, MachineFaults, Measurements, SensorFaults,
-};
+use crate::exchange::{Actuators, Brakes, BySection, MachineFaults, Measurements, SensorFaults};
 use crate::machine::{Machine, MachineError};
 use crate::real::{Accumulator, Real, Ring, Scalar};
 use contact::{Contact, Holding, ParentRoll, Traction};
