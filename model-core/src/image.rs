@@ -132,6 +132,9 @@ signals! {
 
     // more of the drive system
     WARNINGS:         Feedback 43, Winder, Bits(logic::WARNING_BITS), "", 1.0, 0.0 ..= 65535.0, "Warnings that stand";
+    BROKEN_SPAN:      Feedback 44, Simulator, U16, "", 1.0, 0.0 ..= 16.0, "Span in which the web has parted, counted from the unwind; 0 while it is whole";
+    WINDING:          Feedback 45, Simulator, Bits(logic::WINDING_BITS), "", 1.0, 0.0 ..= 65535.0, "How the shipping roll is being wound, where slip is computed";
+    WOUND_ON_TENSION: Feedback 46, Simulator, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Wound-on tension per width, where slip or compression is computed";
 }
 
 /// Jog speed at power-up, m/min.

@@ -28,7 +28,6 @@ impl<R: Real> Logic<R> {
         let get = |signal| commands.get::<R>(signal);
         let percent = R::of(0.01);
         let drum_limit = get(&image::TORQUE_LIMIT_DRUMS) * percent;
-        let word = self.sections.rd.word();
         let tripped = self.faults.latched().tripped();
         let mut row = self.row(sight);
         if tripped.uw && row.unwind != UnwindControl::Off {
@@ -41,7 +40,7 @@ impl<R: Real> Logic<R> {
             v_target: row.v,
             acceleration: row.limits.0,
             jerk: row.limits.1,
-            freeze_ramp: word & stw1::UNFREEZE_RAMP == 0 && self.mode == Mode::Run,
+            freeze_ramp: false,
             tension: row.tension,
             preset: self.one_shot.preset,
             freeze_diameter: matches!(self.mode, Mode::WebBreakStop | Mode::UnwindManeuver),
@@ -80,10 +79,10 @@ impl<R: Real> Logic<R> {
         let word = self.sections.rd.word();
         let moving = |v| {
             let enabled = stw1::ENABLE_RAMP | stw1::ENABLE_SETPOINT;
-            if word & enabled == enabled {
-                v
-            } else {
+            if word & enabled != enabled {
                 R::ZERO
+            } else {
+                self.frozen.unwrap_or(v)
             }
         };
         // without web the unwind stands by its brake

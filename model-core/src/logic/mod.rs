@@ -29,7 +29,7 @@ mod words;
 pub use section::{Demand, Section, State};
 pub use words::{
     COMMAND_BITS, DRIVE_FAULT_BITS, Fault, LOOPS, MACHINE_FAULT_BITS, Mode, Refusal,
-    SENSOR_FAULT_BITS, STATUS_BITS, WARNING_BITS, command, inject, status, warning,
+    SENSOR_FAULT_BITS, STATUS_BITS, WARNING_BITS, WINDING_BITS, command, inject, status, warning,
 };
 
 use crate::exchange::{Brakes, BySection, DriveCommand, DriveStatus, Handling, Measurements};
@@ -116,6 +116,8 @@ pub struct Logic<R> {
     jog: i8,
     /// It was commanded in the last cycle.
     jogged: bool,
+    /// Speed at which the frozen ramp comes to rest.
+    frozen: Option<R>,
     /// Brakes as they were asked for in the last cycle.
     asked: Brakes<bool>,
     one_shot: OneShot<R>,
@@ -210,6 +212,7 @@ impl<R: Real> Logic<R> {
             drums_held: false,
             jog: 0,
             jogged: false,
+            frozen: None,
             asked: Brakes::default(),
             one_shot: OneShot::default(),
             answer: Feedback::default(),
@@ -246,6 +249,7 @@ impl<R: Real> Logic<R> {
         self.obey_requests(&sight);
         self.withdraw(&sight);
         self.go_on(&sight);
+        self.freeze_ramp(&sight);
         self.last_command = commands.word(&image::WINDER_COMMAND);
         self.jogged = sight.jog != Some(0);
         let mut answer = self.answer;
@@ -365,13 +369,15 @@ impl<R: Real> Logic<R> {
     fn detect(&mut self, sight: &Sight<R>) {
         let (c, m) = (&self.c, sight.m);
         let stall = sight.commands.get::<R>(&image::STALL_SET) * c.width;
+        // a break at crawl is found in the cycle in which tension would no longer be detected
+        let held = self.holds_tension();
         self.tension
             .step(m.tension > c.detected * stall, TENSION_CYCLES);
         let now = self.tension_now.step(m.tension);
         let look = self.look(sight);
         self.faults.watch(&look, &self.patience);
 
-        let lost = self.holds_tension() && now < c.lost * sight.drive.tension_ref;
+        let lost = held && now < c.lost * sight.drive.tension_ref;
         let patience = if sight.drive.v.abs() > c.web_break_speed {
             WEB_BREAK_CYCLES
         } else {
@@ -590,6 +596,19 @@ impl<R: Real> Logic<R> {
         self.one_shot.preset = Some(r + r * error * R::of(0.01));
         self.preset_taken = true;
         Ok(())
+    }
+
+    /// While the ramp generator is frozen the speed stays where its acceleration can be rounded off: v + a·|a|/2j.
+    fn freeze_ramp(&mut self, sight: &Sight<R>) {
+        let frozen = self.sections.rd.word() & stw1::UNFREEZE_RAMP == 0;
+        if !frozen || !matches!(self.mode, Mode::Thread | Mode::Run) {
+            self.frozen = None;
+        } else if self.frozen.is_none() {
+            let (v, a) = (sight.drive.v_ref, sight.drive.a_ref);
+            let jerk: R = sight.commands.get(&image::JERK_SET);
+            let rest = v + a * a.abs() / (jerk + jerk);
+            self.frozen = Some(rest.clamp(R::ZERO, self.c.max_speed));
+        }
     }
 
     /// Modes that end by themselves.

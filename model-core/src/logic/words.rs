@@ -359,5 +359,17 @@ pub const DRIVE_FAULT_BITS: &[Bit] = &[
     ),
 ];
 
+/// The bits of the word on the winding by name.
+pub const WINDING_BITS: &[Bit] = &[
+    Bit::new(0, "slides_rd", "the rear drum slides on the shipping roll"),
+    Bit::new(1, "slides_fd", "the front drum slides on the shipping roll"),
+    Bit::new(2, "slides_rr", "the rider roll slides on the shipping roll"),
+    Bit::new(
+        3,
+        "burst",
+        "the wound-on tension was above the web's strength",
+    ),
+];
+
 /// The loops that auto-tune knows, by their code.
 pub const LOOPS: &[&str] = &["drum speed", "unwind speed", "tension"];
