@@ -430,6 +430,50 @@ fn a_wrong_preset_is_off_by_its_error() {
     }
 }
 
+/// Largest and smallest tension of the measured span up to 600 m/min, of its reference.
+fn ramp_with(faults: u16) -> (f64, f64) {
+    let mut o = threaded();
+    put(&mut o, &image::FAULT_DRIVES, faults);
+    o.set(&image::V_SET, 600.0);
+    o.command(command::RUN);
+    let (mut low, mut high) = (f64::MAX, 0.0_f64);
+    o.wait_with(30.0, |o| {
+        let share = o.t()[1] / f64::from(o.simulator.status().tension_ref);
+        low = low.min(share);
+        high = high.max(share);
+    });
+    (low, high)
+}
+
+/// Without the torque for the roll's inertia the tension falls as the winder accelerates, and peaks afterwards.
+#[test]
+fn without_inertia_compensation_the_tension_goes_astray() {
+    let (low, high) = ramp_with(0);
+    assert!(low > 0.9 && high < 1.1, "{low} to {high}");
+    let (low, high) = ramp_with(inject::NO_INERTIA_COMPENSATION);
+    assert!(low < 0.7 || high > 1.3, "{low} to {high}");
+}
+
+/// A preset that is wrong by 3 % is put right at once where nothing holds it: in thread, by the unwind's own draw.
+#[test]
+fn a_bare_estimator_follows_whatever_the_encoders_say() {
+    let estimates = |faults: u16| {
+        let mut o = Operator::<f32>::new();
+        o.prepare();
+        put(&mut o, &image::FAULT_DRIVES, faults);
+        o.command(command::THREAD);
+        let (mut low, mut high) = (f64::MAX, 0.0_f64);
+        o.wait_with(15.0, |o| {
+            low = low.min(o.value(&image::D_UW));
+            high = high.max(o.value(&image::D_UW));
+        });
+        high - low
+    };
+    assert!(estimates(0) < 0.5, "held below 3 % speed");
+    let spike = estimates(inject::BARE_ESTIMATOR);
+    assert!(spike > 20.0, "{spike} mm");
+}
+
 /// Drums that have lost nine tenths of their friction slide when they accelerate; sound ones do not.
 #[test]
 fn worn_drums_slide() {

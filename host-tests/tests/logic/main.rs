@@ -3,6 +3,7 @@
 //! Not here: how well the regulators hold what the logic asks for.
 #![allow(clippy::float_cmp, clippy::unwrap_used)]
 
+mod autotune;
 mod bus;
 mod faults;
 mod maneuver;
@@ -60,7 +61,7 @@ fn stalled() -> Operator<f32> {
     o
 }
 
-/// The winder in a mode; none in auto-tune, whose regulators take a command of their own.
+/// The winder in a mode.
 fn in_mode(mode: Mode) -> Operator<f32> {
     let mut o = match mode {
         Mode::Off => {
@@ -91,6 +92,7 @@ fn in_mode(mode: Mode) -> Operator<f32> {
         Mode::NormalStop => o.command(0),
         Mode::EmergencyStop => o.drives(stw1::RUN & !stw1::NO_QUICK_STOP),
         Mode::CoastStop => o.drives(stw1::RUN & !stw1::NO_COAST),
+        Mode::AutoTune => unreachable!("auto-tune has tests of its own"),
         Mode::WebBreakStop => {
             o.simulator.plant.winder_mut().break_web();
             o.until(1.0, |o| o.is(status::WEB_BREAK));

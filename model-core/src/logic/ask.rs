@@ -4,7 +4,8 @@
 
 use super::{Logic, Mode, Sight, inject};
 use crate::exchange::{
-    Brakes, BySection, DriveCommand, Faults, MachineFaults, SensorFaults, Stuck, UnwindControl,
+    Brakes, BySection, DriveCommand, Faults, Loop, MachineFaults, SensorFaults, Stuck,
+    UnwindControl,
 };
 use crate::image;
 use crate::profidrive::stw1;
@@ -29,6 +30,7 @@ impl<R: Real> Logic<R> {
         let percent = R::of(0.01);
         let drum_limit = get(&image::TORQUE_LIMIT_DRUMS) * percent;
         let tripped = self.faults.latched().tripped();
+        let defects = commands.word(&image::FAULT_DRIVES);
         let mut row = self.row(sight);
         if tripped.uw && row.unwind != UnwindControl::Off {
             (row.unwind, row.brakes.uw) = (UnwindControl::Off, true);
@@ -60,6 +62,9 @@ impl<R: Real> Logic<R> {
             brakes: row.brakes,
             handling: self.one_shot.handling,
             faults: self.inject(sight),
+            autotune: (self.mode == Mode::AutoTune).then_some(self.tuned),
+            bare_estimator: defects & inject::BARE_ESTIMATOR != 0,
+            no_inertia_compensation: defects & inject::NO_INERTIA_COMPENSATION != 0,
         }
     }
 
@@ -126,7 +131,11 @@ impl<R: Real> Logic<R> {
                 };
                 (Speed, false, v, normal, zero, on(false, true))
             }
-            Mode::AutoTune => (pull, true, moving(crawl), normal, stall, open),
+            Mode::AutoTune => match self.tuned {
+                Loop::DrumSpeed => (Off, true, zero, normal, zero, on(true, false)),
+                Loop::UnwindSpeed => (Off, false, zero, normal, zero, on(false, true)),
+                Loop::Tension => (pull, true, moving(crawl), normal, stall, open),
+            },
         };
         Row {
             unwind,
