@@ -169,6 +169,11 @@ impl<R: Scalar, const SPANS: usize> Simulator<R, SPANS> {
         self.record
     }
 
+    /// What acts on the winder until the next drive cycle.
+    pub fn actuators(&self) -> &Actuators<R::Si> {
+        &self.actuators
+    }
+
     /// What the regulators told last.
     pub fn status(&self) -> &DriveStatus<R::Si> {
         &self.status

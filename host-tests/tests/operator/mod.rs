@@ -26,6 +26,8 @@ pub struct Operator<R: Float> {
     pub silent: bool,
     /// Drive cycles since power-up.
     pub cycles: u32,
+    /// The commands of every cycle, where they are kept.
+    pub log: Option<Vec<Commands>>,
 }
 
 impl<R: Float> Operator<R> {
@@ -45,6 +47,7 @@ impl<R: Float> Operator<R> {
             machine,
             silent: false,
             cycles: 0,
+            log: None,
         }
     }
 
@@ -55,6 +58,9 @@ impl<R: Float> Operator<R> {
             self.image
                 .commands
                 .set_word(&image::HEARTBEAT_PLC, beat.wrapping_add(1));
+        }
+        if let Some(log) = &mut self.log {
+            log.push(self.image.commands);
         }
         self.simulator.drive_cycle(&mut self.image);
         self.cycles += 1;

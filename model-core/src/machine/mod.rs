@@ -305,6 +305,13 @@ impl Machine {
         rolls.iter().map(|roll| roll.mass_kg()).sum::<f64>() + roll / (r_wu * r_wu)
     }
 
+    /// Length of span `i`, m: those that lead to the idle rolls, and the last.
+    pub fn span_m(&self, i: usize) -> f64 {
+        self.idle
+            .get(i)
+            .map_or(self.last_span_m, |roll| roll.span_m)
+    }
+
     /// Length of the web from the unwind to the rear drum, m.
     pub fn web_path_m(&self) -> f64 {
         self.idle.iter().map(|roll| roll.span_m).sum::<f64>() + self.last_span_m

@@ -30,7 +30,7 @@ use nip::Nips;
 use rk4::State;
 use sensors::{Sensors, Sight};
 use span::Web;
-use units::Units;
+use units::{One, Units};
 use windup::{FRONT, Nip, Parts, ROLLS, Speeds, Whole};
 
 /// Period of the plant task and longest step of its integration, ms.
@@ -149,7 +149,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let limits = Limits::new(machine, &units);
         let zero = R::Sum::at(R::ZERO);
         Ok(Self {
-            motion: Motion::new(machine, &units, step),
+            motion: Motion::new(&One(machine, &units), step),
             holders: Holders::new(machine, step),
             scale: Scale::new(&units),
             substeps,
