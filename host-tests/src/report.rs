@@ -14,7 +14,7 @@ use crate::plc::{Recipe, Sample};
 /// Permitted deviation of the tension in acceleration and deceleration, of its reference.
 pub const TENSION_BAND: f64 = 0.10;
 /// Permitted error of the roll's diameter, mm.
-pub const DIAMETER_TOLERANCE_MM: f64 = 2.0;
+pub const DIAMETER_TOLERANCE_MM: f64 = 1.0;
 /// The reference ramps where its acceleration is above this, m/s².
 const RAMPING_M_S2: f64 = 0.005;
 /// At thread speed and above, the last count of the feedback aside.
