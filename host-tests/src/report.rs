@@ -270,16 +270,16 @@ mod tests {
     #[test]
     fn a_limit_is_missed_by_what_lies_beyond_it() {
         use Mode::{NormalStop, Run};
-        let good = [(Run, 0.45, 0.91, 300.0), (NormalStop, -0.45, 1.09, 401.9)];
+        let good = [(Run, 0.45, 0.91, 300.0), (NormalStop, -0.45, 1.09, 400.9)];
         assert!(report(&good).missed().is_empty());
         for (i, bad, missed) in [
             (0, (Run, 0.45, 0.89, 300.0), "tension in acceleration"),
             (
                 1,
-                (NormalStop, -0.45, 1.11, 401.9),
+                (NormalStop, -0.45, 1.11, 400.9),
                 "tension in deceleration",
             ),
-            (1, (NormalStop, -0.45, 1.09, 402.1), "diameter of the roll"),
+            (1, (NormalStop, -0.45, 1.09, 401.1), "diameter of the roll"),
             // what has not been seen has not been kept
             (0, (Run, 0.0, 1.0, 300.0), "tension in acceleration"),
         ] {
