@@ -197,7 +197,7 @@ mod motor {
     /// 20.5 kN·m up to 500 kW at 24.4 rad/s, then constant power; in both directions, 150 % for a while.
     #[test]
     fn torque_is_limited_by_rated_torque_and_rated_power() {
-        let motor = Motor::<f64>::new(&Machine::news_8000().motors.uw);
+        let motor = Motor::<f64>::new(&Machine::news_8000().motors.uw, 1.5, CYCLE);
         for (omega, share, limit) in [
             (0.0, 1.0, 20.5e3),
             (24.3, 1.0, 20.5e3),

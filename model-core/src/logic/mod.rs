@@ -533,6 +533,7 @@ impl<R: Real> Logic<R> {
             front_share_trim: get(&image::FRONT_SHARE_TRIM) * percent,
             brakes,
             handling: self.one_shot.handling,
+            ..DriveCommand::default()
         }
     }
 }

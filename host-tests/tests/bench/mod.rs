@@ -1,0 +1,147 @@
+//! The regulators and the plant on a bench: no logic, commands by hand.
+//!
+//! Not here: modes, sections, a PLC.
+// every test program uses its part of it
+#![allow(dead_code)]
+
+use model_core::drive::{DRIVE_PERIOD_MS, Drive};
+use model_core::exchange::{
+    Actuators, BySection, DriveCommand, DriveStatus, Loop, Measurements, TuneStep, UnwindControl,
+};
+use model_core::machine::Machine;
+use model_core::plant::rk4::State;
+use model_core::plant::{PLANT_PERIOD_MS, Winder};
+use model_core::real::Real;
+
+/// A drive cycle, s.
+pub const CYCLE: f64 = 1e-3 * DRIVE_PERIOD_MS as f64;
+
+/// The bench.
+#[derive(Clone)]
+pub struct Bench<R: Real> {
+    pub machine: Machine,
+    pub winder: Winder<R, 3>,
+    pub drive: Drive<R>,
+    pub command: DriveCommand<R>,
+    pub m: Measurements<R>,
+    pub status: DriveStatus<R>,
+    /// Torques that somebody adds at the shafts, N·m.
+    pub disturbance: BySection<R>,
+    actuators: Actuators<R>,
+    phase_ms: u32,
+}
+
+impl<R: Real> Bench<R> {
+    /// A machine at standstill without web, its rolls of these radii, m; the drive knows the parent roll's as `preset`.
+    pub fn new(machine: &Machine, r_uw: f64, preset: f64, r_wu: f64) -> Self {
+        let mut winder = Winder::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS)).unwrap();
+        let mut x = winder.state();
+        (x.r_uw, x.r_wu) = (R::of(r_uw), R::of(r_wu));
+        winder.set_state(&x);
+        let o = &machine.operation;
+        let mut bench = Self {
+            machine: machine.clone(),
+            winder,
+            drive: Drive::new(machine),
+            command: DriveCommand {
+                acceleration: R::of(o.acceleration_m_s2),
+                jerk: R::of(o.jerk_m_s3),
+                torque_limit: BySection::all(R::of(1.5)),
+                preset: Some(R::of(preset)),
+                ..DriveCommand::default()
+            },
+            m: Measurements::default(),
+            status: DriveStatus::default(),
+            disturbance: BySection::default(),
+            actuators: Actuators::default(),
+            phase_ms: 0,
+        };
+        bench.wait(0.1);
+        bench.command.preset = None;
+        bench
+    }
+
+    /// The same with a tight web that runs at a speed, m/s, in tension control, everything at rest.
+    pub fn running(machine: &Machine, r_uw: f64, r_wu: f64, v: f64) -> Self {
+        let mut bench = Self::new(machine, r_uw, r_uw, r_wu);
+        let o = &machine.operation;
+        let share = if v > o.thread_speed_m_s { 1.0 } else { o.stall_share };
+        let tension = share * bench.full_tension();
+        // the tension reference has its ramp behind it
+        bench.command.tension = R::of(tension);
+        bench.wait(10.0);
+        bench.winder.thread_at(R::of(tension));
+        let mut x = bench.winder.state();
+        // the strain of the tension makes the roll slower than the web
+        let strain = tension / (machine.web.stiffness_n_m * machine.web.width_m);
+        x.v = [R::of(v); 3];
+        x.windup = [R::of(v); 3];
+        x.omega_uw = R::of(v / r_uw / (1.0 + strain));
+        bench.winder.set_state(&x);
+        // the drives see the machine turn, and take over
+        bench.wait(2.0 * CYCLE);
+        bench.hold(v);
+        bench
+    }
+
+    /// Tension control at a speed, m/s.
+    pub fn hold(&mut self, v: f64) {
+        self.command.unwind = UnwindControl::Tension;
+        self.command.drums = true;
+        self.command.v_target = R::of(v);
+    }
+
+    /// Full tension, N.
+    pub fn full_tension(&self) -> f64 {
+        self.machine.operation.tension_n_m * self.machine.web.width_m
+    }
+
+    /// One drive cycle.
+    pub fn cycle(&mut self) {
+        let end = self.phase_ms + DRIVE_PERIOD_MS;
+        for _ in 0..end / PLANT_PERIOD_MS - self.phase_ms / PLANT_PERIOD_MS {
+            self.m = self.winder.step(&self.actuators);
+        }
+        self.phase_ms = end % (PLANT_PERIOD_MS * DRIVE_PERIOD_MS);
+        (self.actuators, self.status) = self.drive.step(&self.command, &self.m);
+        let (torque, more) = (self.actuators.torque, self.disturbance);
+        self.actuators.torque = torque.zip(more).map(|(t, more)| t + more);
+    }
+
+    /// Waits, s, with an eye on something in every cycle.
+    pub fn wait_with(&mut self, seconds: f64, mut look: impl FnMut(&Self)) {
+        for _ in 0..(seconds / CYCLE).round() as u32 {
+            self.cycle();
+            look(self);
+        }
+    }
+
+    /// Waits, s.
+    pub fn wait(&mut self, seconds: f64) {
+        self.wait_with(seconds, |_| ());
+    }
+
+    /// Tunes a loop to its end, or gives up after ten minutes; gives the time it took, s.
+    pub fn tune(&mut self, of: Loop) -> f64 {
+        self.command.autotune = Some(of);
+        for cycle in 0..60_000_u32 {
+            self.cycle();
+            let step = self.status.autotune.step;
+            if matches!(step, TuneStep::Done | TuneStep::Aborted) {
+                self.command.autotune = None;
+                return CYCLE * f64::from(cycle);
+            }
+        }
+        panic!("still tuning: {:?}", self.status.autotune);
+    }
+
+    /// Ground truth: the plant's state.
+    pub fn x(&self) -> State<f64, 3> {
+        self.winder.state().map(Real::to_f64)
+    }
+
+    /// Ground truth: tensions, N.
+    pub fn t(&self) -> [f64; 3] {
+        self.winder.tension().map(Real::to_f64)
+    }
+}
