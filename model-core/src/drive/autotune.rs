@@ -61,6 +61,9 @@ const AT_REST: f64 = 0.05;
 const REST_S: f64 = 3.0;
 /// The band of speed for the tension loop, of the thread speed.
 const THREAD_BAND: [f64; 2] = [0.5, 2.0];
+/// A web that overshoots a step by less than this share of it does not swing: its mode is damped, or too fast for the
+/// load cells, and the loop is limited by their filter.
+const SWINGS: f64 = 0.20;
 /// Zero crossings that are waited for: one whole swing between the first and the last.
 const CROSSINGS: u32 = 3;
 
@@ -102,6 +105,9 @@ pub struct Span<R> {
     pub stiffness: R,
     /// Mass of the parent roll at its surface, kg.
     pub mass: R,
+    /// Mass of the windup at its surface, kg: the speed loop of the drums is slower than the web, which swings between
+    /// the two.
+    pub drum_mass: R,
 }
 
 /// What has been found.
@@ -560,8 +566,13 @@ impl<R: Real> Tuner<R> {
             return Some(R::ZERO);
         }
         let swing = self.swing.mean(&self.ring.swing());
-        let (mode, damping) = swing.mode(self.c.per_period);
-        let stiffness = span.mass * (mode * mode);
+        let (stiffness, damping) = if swing.overshoot < self.level * R::of(SWINGS) {
+            (span.stiffness, R::ONE)
+        } else {
+            let (mode, damping) = swing.mode(self.c.per_period);
+            let mass = span.mass * span.drum_mass / (span.mass + span.drum_mass);
+            (mass * (mode * mode), damping)
+        };
         self.report.stiffness = stiffness;
         if !is_plausible(stiffness, span.stiffness) {
             self.abort(TuneAbort::Implausible);
@@ -639,10 +650,13 @@ struct Ring<R> {
     peaks: [R; CROSSINGS as usize - 1],
 }
 
-/// Half a swing: its duration in periods, and how much smaller it is than the half before.
+/// Half a swing.
 #[derive(Clone, Copy, Debug, Default)]
 struct Swing<R> {
+    /// Its duration, in periods.
     half: R,
+    /// How far the first half goes, and how much smaller the second is.
+    overshoot: R,
     ratio: R,
 }
 
@@ -685,6 +699,7 @@ impl<R: Real> Ring<R> {
         let [before, after] = self.peaks;
         Swing {
             half: (self.latest - self.first) * R::of(0.5),
+            overshoot: before,
             ratio: after / before,
         }
     }
@@ -695,6 +710,7 @@ impl<R: Real> Swing<R> {
         let half = R::of(0.5);
         Self {
             half: half * (self.half + other.half),
+            overshoot: half * (self.overshoot + other.overshoot),
             ratio: half * (self.ratio + other.ratio),
         }
     }

@@ -12,6 +12,8 @@ use crate::real::Real;
 
 /// The most points in the table of the front drum's share.
 const MOST_SHARES: usize = 2;
+/// Lag with which the drums take over the tension that the unwind holds, s.
+const TENSION_LAG_S: f64 = 0.5;
 /// A drum whose lever on the force is shorter than this, m, does not limit it.
 const LEAST_LEVER: f64 = 1e-3;
 
@@ -21,6 +23,8 @@ pub struct Drums<R> {
     c: Coefficients<R>,
     tuning: DrumTuning<R>,
     speed: Pi<R>,
+    /// Tension that is worked against, N; from the measured to the held one it goes smoothly.
+    tension: R,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +43,8 @@ struct Coefficients<R> {
     front_share: Table<R, MOST_SHARES>,
     /// Rider roll's share of the winding force.
     rider_share: R,
+    /// Share of a change of tension that a period makes up for.
+    tension_share: R,
 }
 
 /// What the drums are to do.
@@ -49,13 +55,23 @@ pub struct DrumTask<R> {
     pub a_ref: R,
     /// Limits of torque, of rated torque.
     pub limit: BySection<R>,
+    /// Tension that the unwind holds, N, to work against; otherwise it is the measured one. With that, web and drums
+    /// would push each other up.
+    pub tension: Option<R>,
+    /// What the unwind pulls besides, N: auto-tune looks how the web swings.
+    pub probe: R,
     /// Added to the front drum's share.
     pub share_trim: R,
 }
 
 impl<R: Real> Drums<R> {
-    /// For a machine.
-    pub fn new(machine: &Machine, motors: &BySection<Motor<R>>, tuning: &DrumTuning<R>) -> Self {
+    /// For a machine, stepped every `period` seconds.
+    pub fn new(
+        machine: &Machine,
+        motors: &BySection<Motor<R>>,
+        tuning: &DrumTuning<R>,
+        period: f64,
+    ) -> Self {
         let (rd, fd, rr) = (&machine.rear_drum, &machine.front_drum, &machine.rider_roll);
         let path = &machine.idle[machine.load_cells.roll + 1..];
         let r = R::of;
@@ -72,15 +88,18 @@ impl<R: Real> Drums<R> {
                 rider_friction: r(rr.friction_n_s_m),
                 front_share: Table::new(front_shares(machine)),
                 rider_share: r(RIDER_SHARE),
+                tension_share: r(-libm::expm1(-period / TENSION_LAG_S)),
             },
             tuning: *tuning,
             speed: Pi::default(),
+            tension: R::ZERO,
         }
     }
 
     /// Opens the loop.
     pub fn off(&mut self) {
         self.speed.reset();
+        self.tension = R::ZERO;
     }
 
     /// What the regulators know, and their gains.
@@ -137,17 +156,25 @@ impl<R: Real> Drums<R> {
 
     /// One period: torques of rear drum, front drum and rider roll, N·m. The unwind's is zero.
     ///
-    /// F = M̂·a* + ĉ·v* + t + path + PI(v* − v), with the measured tension t and what the idle rolls after the load
+    /// F = M̂·a* + ĉ·v* + t + path + PI(v* − v), with the tension t and what the idle rolls after the load
     /// cells take. The rider roll turns itself and gives its share of what is compensated; of the rest, which the
     /// regulator trims, the front drum takes its share.
     pub fn step(&mut self, task: &DrumTask<R>, m: &Measurements<R>) -> BySection<R> {
         let c = &self.c;
+        match task.tension {
+            Some(held) => self.tension += c.tension_share * (held - self.tension),
+            None => self.tension = m.tension,
+        }
         let error = task.v_ref - self.speed(m);
         let mass = self.tuning.mass(m.d_wu);
         let gains = self.tuning.speed_gains(mass);
 
         let path = c.path_mass * task.a_ref + c.path_friction * task.v_ref;
-        let feed_forward = mass * task.a_ref + self.tuning.friction * task.v_ref + m.tension + path;
+        let feed_forward = mass * task.a_ref
+            + self.tuning.friction * task.v_ref
+            + self.tension
+            + task.probe
+            + path;
         let own = c.rider_mass * task.a_ref + c.rider_friction * task.v_ref;
         let rider_force = own + c.rider_share * (feed_forward - own);
         let rider = (rider_force * c.r_rr).limit(c.motors.rr.limit(m.omega.rr, task.limit.rr));

@@ -92,7 +92,7 @@ impl<R: Real> Drive<R> {
                 diameter.radius(),
                 period,
             ),
-            drums: Drums::new(machine, &motors, &tuning.drums),
+            drums: Drums::new(machine, &motors, &tuning.drums, period),
             motors,
             overload: BySection::default(),
             tuner: Tuner::new(machine, period),
@@ -196,26 +196,25 @@ impl<R: Real> Drive<R> {
         } else {
             self.speed.rate()
         };
-        let uw = match tuned {
-            Some(Loop::UnwindSpeed) => self.tune_unwind(m, limit.uw),
-            _ => {
-                let probe = match tuned {
-                    Some(Loop::Tension) => self.tune_tension(command, m, v),
-                    _ => None,
-                };
-                let task = UnwindTask {
-                    control: command.unwind,
-                    v_ref: self.speed.value(),
-                    a_ref,
-                    tension_ref: self.tension.value(),
-                    tension_rate: self.tension.rate(),
-                    v,
-                    r: self.diameter.radius(),
-                    limit: limit.uw,
-                    probe,
-                };
-                self.unwind.step(&task, m)
-            }
+        let probe = match tuned {
+            Some(Loop::Tension) => self.tune_tension(command, m, v),
+            _ => None,
+        };
+        let uw = if tuned == Some(Loop::UnwindSpeed) {
+            self.tune_unwind(m, limit.uw)
+        } else {
+            let task = UnwindTask {
+                control: command.unwind,
+                v_ref: self.speed.value(),
+                a_ref,
+                tension_ref: self.tension.value(),
+                tension_rate: self.tension.rate(),
+                v,
+                r: self.diameter.radius(),
+                limit: limit.uw,
+                probe,
+            };
+            self.unwind.step(&task, m)
         };
         let windup = if tuned == Some(Loop::DrumSpeed) {
             self.drums.off();
@@ -225,6 +224,8 @@ impl<R: Real> Drive<R> {
                 v_ref: self.speed.value(),
                 a_ref,
                 limit,
+                tension: (command.unwind == UnwindControl::Tension).then(|| self.tension.value()),
+                probe: probe.unwrap_or_default(),
                 share_trim: command.front_share_trim,
             };
             self.drums.step(&task, m)
@@ -298,6 +299,7 @@ impl<R: Real> Drive<R> {
             controlled: command.unwind == UnwindControl::Tension && command.drums,
             stiffness: tuning.web_stiffness,
             mass: tuning.inertia(r) / (r * r),
+            drum_mass: self.drums.tuning().mass(m.d_wu),
         })
     }
 
