@@ -467,7 +467,8 @@ mod closed_loop {
         near("stop", stop, RUN / 1.0 + 1.0 / 2.0, 0.2);
         assert_eq!(o.mode(), Mode::Ready);
         assert!(o.is(status::ZERO_SPEED | status::BRAKE_UW));
-        assert_eq!(o.value(&image::D_UW), estimate, "the estimate is frozen");
+        // the estimate is frozen; until the break was found, the roll may have lost a count
+        near("d_uw", o.value(&image::D_UW), estimate, 0.11);
         assert_eq!(o.t(), [0.0; 3]);
         // the fault stands until it is acknowledged; then a new web may be threaded
         o.command(command::THREAD);

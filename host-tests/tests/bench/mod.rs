@@ -11,14 +11,14 @@ use model_core::exchange::{
 use model_core::machine::Machine;
 use model_core::plant::rk4::State;
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
-use model_core::real::Real;
+use model_core::real::Float;
 
 /// A drive cycle, s.
 pub const CYCLE: f64 = 1e-3 * DRIVE_PERIOD_MS as f64;
 
 /// The bench.
 #[derive(Clone)]
-pub struct Bench<R: Real> {
+pub struct Bench<R: Float> {
     pub machine: Machine,
     pub winder: Winder<R, 3>,
     pub drive: Drive<R>,
@@ -31,7 +31,7 @@ pub struct Bench<R: Real> {
     phase_ms: u32,
 }
 
-impl<R: Real> Bench<R> {
+impl<R: Float> Bench<R> {
     /// A machine at standstill without web, its rolls of these radii, m; the drive knows the parent roll's as `preset`.
     pub fn new(machine: &Machine, r_uw: f64, preset: f64, r_wu: f64) -> Self {
         let mut winder = Winder::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS)).unwrap();
@@ -65,7 +65,11 @@ impl<R: Real> Bench<R> {
     pub fn running(machine: &Machine, r_uw: f64, r_wu: f64, v: f64) -> Self {
         let mut bench = Self::new(machine, r_uw, r_uw, r_wu);
         let o = &machine.operation;
-        let share = if v > o.thread_speed_m_s { 1.0 } else { o.stall_share };
+        let share = if v > o.thread_speed_m_s {
+            1.0
+        } else {
+            o.stall_share
+        };
         let tension = share * bench.full_tension();
         // the tension reference has its ramp behind it
         bench.command.tension = R::of(tension);
@@ -137,11 +141,11 @@ impl<R: Real> Bench<R> {
 
     /// Ground truth: the plant's state.
     pub fn x(&self) -> State<f64, 3> {
-        self.winder.state().map(Real::to_f64)
+        self.winder.state().map(R::to_f64)
     }
 
     /// Ground truth: tensions, N.
     pub fn t(&self) -> [f64; 3] {
-        self.winder.tension().map(Real::to_f64)
+        self.winder.tension().map(R::to_f64)
     }
 }

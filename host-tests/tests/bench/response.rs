@@ -6,7 +6,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Lines of the spectrum, in multiples of the lowest that the window resolves.
 const LINES: [u32; 24] = [
-    3, 6, 9, 12, 15, 18, 22, 27, 33, 40, 48, 58, 70, 85, 105, 130, 165, 210, 275, 350, 450, 600, 900, 1400,
+    3, 6, 9, 12, 15, 18, 22, 27, 33, 40, 48, 58, 70, 85, 105, 130, 165, 210, 275, 350, 450, 600,
+    900, 1400,
 ];
 /// Drive cycles of the window.
 pub const WINDOW: u32 = 3142;

@@ -7,11 +7,9 @@ use super::pi::Pi;
 use super::table::Table;
 use super::tuning::DrumTuning;
 use crate::exchange::{BySection, Measurements};
-use crate::machine::Machine;
+use crate::machine::{MAX_FRONT_SHARES, Machine};
 use crate::real::Real;
 
-/// The most points in the table of the front drum's share.
-const MOST_SHARES: usize = 2;
 /// Lag with which the drums take over the tension that the unwind holds, s.
 const TENSION_LAG_S: f64 = 0.5;
 /// A drum whose lever on the force is shorter than this, m, does not limit it.
@@ -40,7 +38,7 @@ struct Coefficients<R> {
     rider_mass: R,
     rider_friction: R,
     /// Front drum's share of the drums' force over the diameter.
-    front_share: Table<R, MOST_SHARES>,
+    front_share: Table<R, MAX_FRONT_SHARES>,
     /// Rider roll's share of the winding force.
     rider_share: R,
     /// Share of a change of tension that a period makes up for.
@@ -74,6 +72,8 @@ impl<R: Real> Drums<R> {
     ) -> Self {
         let (rd, fd, rr) = (&machine.rear_drum, &machine.front_drum, &machine.rider_roll);
         let path = &machine.idle[machine.load_cells.roll + 1..];
+        let shares = machine.operation.front_share.iter();
+        let shares = shares.map(|point| (point.diameter_m, point.share));
         let r = R::of;
         Self {
             c: Coefficients {
@@ -86,8 +86,8 @@ impl<R: Real> Drums<R> {
                 path_friction: r(path.iter().map(|roll| roll.friction_n_s_m).sum()),
                 rider_mass: r(rr.mass_kg()),
                 rider_friction: r(rr.friction_n_s_m),
-                front_share: Table::new(front_shares(machine)),
-                rider_share: r(RIDER_SHARE),
+                front_share: Table::new(shares),
+                rider_share: r(machine.operation.rider_share),
                 tension_share: r(-libm::expm1(-period / TENSION_LAG_S)),
             },
             tuning: *tuning,
@@ -192,12 +192,4 @@ impl<R: Real> Drums<R> {
             rr: rider,
         }
     }
-}
-
-const RIDER_SHARE: f64 = 0.05;
-
-fn front_shares(machine: &Machine) -> impl Iterator<Item = (f64, f64)> + Clone {
-    let s = &machine.shipping_roll;
-    let [a, b] = machine.operation.front_share;
-    [(2.0 * s.core_radius_m, a), (2.0 * s.full_radius_m, b)].into_iter()
 }

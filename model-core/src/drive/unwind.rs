@@ -21,7 +21,7 @@ const DRAW_RATE: f64 = 0.005;
 const RADIUS_CHANGE: f64 = 1e-4;
 
 /// Below this speed the compensation of the closed brake fades, m/s: at standstill the brake takes what it must.
-const BRAKE_SPEED: f64 = 0.1;
+const BRAKE_SPEED: f64 = 0.02;
 
 /// Regulators of the unwind.
 #[derive(Clone, Copy, Debug)]
@@ -189,6 +189,7 @@ impl<R: Real> Unwind<R> {
         let v = m.omega.uw * task.r;
         let roll = Roll {
             entered: task.control != self.control,
+            was: self.control,
             v,
             // to raise the tension the unwind must run a little slower than the web
             error: v - task.v + task.tension_rate * k.per_stiffness,
@@ -237,7 +238,7 @@ impl<R: Real> Unwind<R> {
     }
 
     /// Turns a little slower than the web, so that slack is taken up, and holds the web with no more than the
-    /// tension reference once it is tight.
+    /// tension reference once it is tight. Goes on from the torque of another control.
     fn take_up(&mut self, task: &UnwindTask<R>, m: &Measurements<R>, roll: &Roll<R>) -> R {
         let c = &self.c;
         self.draw = if roll.entered {
@@ -248,22 +249,30 @@ impl<R: Real> Unwind<R> {
         let draw = (self.draw * task.v_ref.abs()).max(c.least_draw);
         let feed_forward = self.feed_forward(task, m);
         let low = (feed_forward - task.tension_ref).max(-roll.limit);
-        self.regulate_speed(task.v_ref - draw, feed_forward, low, roll)
+        let error = task.v_ref - draw - roll.v;
+        if roll.entered && roll.was == UnwindControl::Off {
+            self.speed.reset();
+        } else if roll.entered {
+            let standing = self.torque * self.known.per_r - feed_forward;
+            self.speed
+                .start_at(&self.known.speed_gains, error, standing);
+        }
+        self.regulate_speed(error, feed_forward, low, roll)
     }
 
-    /// Follows the speed reference.
+    /// Follows the speed reference. Begins without the torque that stands: the web that it held is gone.
     fn hold_speed(&mut self, task: &UnwindTask<R>, m: &Measurements<R>, roll: &Roll<R>) -> R {
         let feed_forward = self.feed_forward(task, m);
-        self.regulate_speed(task.v_ref, feed_forward, -roll.limit, roll)
-    }
-
-    fn regulate_speed(&mut self, v_ref: R, feed_forward: R, low: R, roll: &Roll<R>) -> R {
         if roll.entered {
             self.speed.reset();
         }
+        let error = task.v_ref - roll.v;
+        self.regulate_speed(error, feed_forward, -roll.limit, roll)
+    }
+
+    fn regulate_speed(&mut self, error: R, feed_forward: R, low: R, roll: &Roll<R>) -> R {
         let gains = &self.known.speed_gains;
-        self.speed
-            .step(gains, v_ref - roll.v, feed_forward, low, roll.limit)
+        self.speed.step(gains, error, feed_forward, low, roll.limit)
     }
 
     /// Inertia, friction and the closed brake: m̂·a* + ĉ·v* + F_brake
@@ -281,8 +290,10 @@ impl<R: Real> Unwind<R> {
 
 /// The parent roll as the drive sees it in this period.
 struct Roll<R> {
-    /// Its control has changed.
+    /// Its control has changed …
     entered: bool,
+    /// … from this.
+    was: UnwindControl,
     /// Surface speed, m/s.
     v: R,
     /// Surface speed less the speed that belongs to the tension reference, m/s.
