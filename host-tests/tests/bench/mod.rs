@@ -4,9 +4,12 @@
 // every test program uses its part of it
 #![allow(dead_code)]
 
+pub mod response;
+
 use model_core::drive::{DRIVE_PERIOD_MS, Drive};
 use model_core::exchange::{
-    Actuators, BySection, DriveCommand, DriveStatus, Loop, Measurements, TuneStep, UnwindControl,
+    Actuators, Autotune, BySection, DriveCommand, DriveStatus, Loop, Measurements, TuneStep,
+    UnwindControl,
 };
 use model_core::machine::Machine;
 use model_core::plant::rk4::State;
@@ -15,6 +18,9 @@ use model_core::real::Float;
 
 /// A drive cycle, s.
 pub const CYCLE: f64 = 1e-3 * DRIVE_PERIOD_MS as f64;
+
+/// From taking over a running machine to rest, s.
+const SETTLE_S: f64 = 12.0;
 
 /// The bench.
 #[derive(Clone)]
@@ -32,8 +38,19 @@ pub struct Bench<R: Float> {
 }
 
 impl<R: Float> Bench<R> {
-    /// A machine at standstill without web, its rolls of these radii, m; the drive knows the parent roll's as `preset`.
-    pub fn new(machine: &Machine, r_uw: f64, preset: f64, r_wu: f64) -> Self {
+    /// A machine at standstill without web, its rolls of these radii, m.
+    pub fn new(machine: &Machine, r_uw: f64, r_wu: f64) -> Self {
+        Self::known_as(machine, machine, r_uw, r_uw, r_wu)
+    }
+
+    /// The same; the drives have another description of it, and know the parent roll's radius as `preset`.
+    pub fn known_as(
+        machine: &Machine,
+        description: &Machine,
+        r_uw: f64,
+        preset: f64,
+        r_wu: f64,
+    ) -> Self {
         let mut winder = Winder::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS)).unwrap();
         let mut x = winder.state();
         (x.r_uw, x.r_wu) = (R::of(r_uw), R::of(r_wu));
@@ -42,7 +59,7 @@ impl<R: Float> Bench<R> {
         let mut bench = Self {
             machine: machine.clone(),
             winder,
-            drive: Drive::new(machine),
+            drive: Drive::new(description),
             command: DriveCommand {
                 acceleration: R::of(o.acceleration_m_s2),
                 jerk: R::of(o.jerk_m_s3),
@@ -61,31 +78,32 @@ impl<R: Float> Bench<R> {
         bench
     }
 
-    /// The same with a tight web that runs at a speed, m/s, in tension control, everything at rest.
-    pub fn running(machine: &Machine, r_uw: f64, r_wu: f64, v: f64) -> Self {
-        let mut bench = Self::new(machine, r_uw, r_uw, r_wu);
-        let o = &machine.operation;
+    /// The same machine with a tight web that runs at a speed, m/s, in tension control: under stall tension up to
+    /// thread speed, under full tension above.
+    pub fn running(mut self, v: f64) -> Self {
+        let o = &self.machine.operation;
         let share = if v > o.thread_speed_m_s {
             1.0
         } else {
             o.stall_share
         };
-        let tension = share * bench.full_tension();
+        let tension = share * self.full_tension();
         // the tension reference has its ramp behind it
-        bench.command.tension = R::of(tension);
-        bench.wait(10.0);
-        bench.winder.thread_at(R::of(tension));
-        let mut x = bench.winder.state();
+        self.command.tension = R::of(tension);
+        self.wait(10.0);
+        self.winder.thread_at(R::of(tension));
+        let mut x = self.winder.state();
         // the strain of the tension makes the roll slower than the web
-        let strain = tension / (machine.web.stiffness_n_m * machine.web.width_m);
+        let strain = tension / (self.machine.web.stiffness_n_m * self.machine.web.width_m);
         x.v = [R::of(v); 3];
         x.windup = [R::of(v); 3];
-        x.omega_uw = R::of(v / r_uw / (1.0 + strain));
-        bench.winder.set_state(&x);
+        x.omega_uw = R::of(v / x.r_uw.to_f64() / (1.0 + strain));
+        self.winder.set_state(&x);
         // the drives see the machine turn, and take over
-        bench.wait(2.0 * CYCLE);
-        bench.hold(v);
-        bench
+        self.wait(2.0 * CYCLE);
+        self.hold(v);
+        self.wait(SETTLE_S);
+        self
     }
 
     /// Tension control at a speed, m/s.
@@ -125,18 +143,25 @@ impl<R: Float> Bench<R> {
         self.wait_with(seconds, |_| ());
     }
 
-    /// Tunes a loop to its end, or gives up after ten minutes; gives the time it took, s.
-    pub fn tune(&mut self, of: Loop) -> f64 {
+    /// Tunes a loop to its end, with an eye on something in every cycle; fails after ten minutes.
+    pub fn tune_with(&mut self, of: Loop, mut look: impl FnMut(&mut Self)) -> Autotune<R> {
         self.command.autotune = Some(of);
-        for cycle in 0..60_000_u32 {
+        for _ in 0..60_000 {
             self.cycle();
-            let step = self.status.autotune.step;
-            if matches!(step, TuneStep::Done | TuneStep::Aborted) {
+            look(self);
+            let told = self.status.autotune;
+            if matches!(told.step, TuneStep::Done | TuneStep::Aborted) {
                 self.command.autotune = None;
-                return CYCLE * f64::from(cycle);
+                self.cycle();
+                return told;
             }
         }
         panic!("still tuning: {:?}", self.status.autotune);
+    }
+
+    /// Tunes a loop to its end.
+    pub fn tune(&mut self, of: Loop) -> Autotune<R> {
+        self.tune_with(of, |_| ())
     }
 
     /// Ground truth: the plant's state.
