@@ -309,7 +309,10 @@ mod aborts {
             let mut cycles = 0_u32;
             let told = b.tune_with(*of, |b| {
                 cycles += 1;
-                if *abort == TuneAbort::TimeOut && *of == Loop::Tension && cycles % 400 == 0 {
+                if *abort == TuneAbort::TimeOut
+                    && *of == Loop::Tension
+                    && cycles.is_multiple_of(400)
+                {
                     b.command.tension = 3640.0 - b.command.tension;
                 }
             });
