@@ -347,8 +347,8 @@ mod unwind {
     }
 }
 
-/// Tension over a run up and a stop with a full parent roll: how far the measured tension is off its reference, of
-/// the reference, the lowest and the highest tension of the measured span, N.
+/// Tension over a run up and a stop with a full parent roll: how far the measured tension rises above its reference,
+/// of the reference, the lowest and the highest tension of the measured span, N.
 fn ramps(preset: f64, no_inertia_compensation: bool) -> (f64, f64, f64) {
     let machine = Machine::news_8000();
     let mut b = Bench::<f32>::known_as(&machine, &machine, 1.5, preset, 0.05).running(0.0);
@@ -356,32 +356,32 @@ fn ramps(preset: f64, no_inertia_compensation: bool) -> (f64, f64, f64) {
     b.command.v_target = machine.operation.thread_speed_m_s as f32;
     b.wait(10.0);
     b.command.tension = TENSION as f32;
-    let (mut error, mut low, mut high) = (0.0_f64, f64::MAX, 0.0_f64);
+    let (mut rise, mut low, mut high) = (0.0_f64, f64::MAX, 0.0_f64);
     for v in [RUN, 0.0] {
         b.command.v_target = v as f32;
         b.wait_with(100.0, |b| {
-            error = error.max((f64::from(b.m.tension / b.status.tension_ref) - 1.0).abs());
+            rise = rise.max(f64::from(b.m.tension / b.status.tension_ref) - 1.0);
             (low, high) = (low.min(b.t()[1]), high.max(b.t()[1]));
         });
     }
     assert!(b.winder.threaded(), "the web broke");
-    (error, low, high)
+    (rise, low, high)
 }
 
 /// With its inertia compensated the roll follows, and the tension hardly moves. A preset 3.3 % low takes a tenth off
-/// the inertia that is compensated, and the tension moves more than twice as far. Without compensation the web has to
-/// pull the roll up to speed, to more than 6 kN, and goes slack when it runs on.
+/// the inertia that is compensated, and the peaks are twice as high. Without compensation the web has to pull the
+/// roll up to speed, with more than 6 kN, and goes slack when it runs on.
 #[test]
 fn tension_in_the_ramps_is_a_matter_of_inertia_compensation() {
-    let (error, low, high) = ramps(1.5, false);
+    let (rise, low, high) = ramps(1.5, false);
     assert!(
-        error < 0.06 && low > 0.25 * TENSION && high < 1.05 * TENSION,
-        "{error} {low} {high}"
+        rise < 0.05 && low > 0.25 * TENSION && high < 1.05 * TENSION,
+        "{rise} {low} {high}"
     );
-    let (low_preset, _, _) = ramps(0.967 * 1.5, false);
+    let (with_low_preset, _, _) = ramps(0.967 * 1.5, false);
     assert!(
-        low_preset > 1.5 * error,
-        "{low_preset} is not much more than {error}"
+        with_low_preset > 2.0 * rise,
+        "{with_low_preset} is not much more than {rise}"
     );
     let (_, low, high) = ramps(1.5, true);
     assert!(low == 0.0 && high > 6000.0, "{low} {high}");
