@@ -388,6 +388,8 @@ pub struct DriveStatus<R> {
     pub r_uw: R,
     /// Tension reference after its ramp, N.
     pub tension_ref: R,
+    /// Measured tension without the lag of the load cells' filter, N: coarse, but it tells at once when there is none.
+    pub tension_at_once: R,
     /// Torques that act on the shafts, N·m.
     pub torque: BySection<R>,
     /// Torques of the motors, of rated torque.

@@ -14,7 +14,7 @@ use model_core::exchange::{
 use model_core::machine::Machine;
 use model_core::plant::rk4::State;
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
-use model_core::real::Float;
+use model_core::real::{Real, Scalar};
 
 /// A drive cycle, s.
 pub const CYCLE: f64 = 1e-3 * DRIVE_PERIOD_MS as f64;
@@ -24,20 +24,20 @@ const SETTLE_S: f64 = 12.0;
 
 /// The bench.
 #[derive(Clone)]
-pub struct Bench<R: Float> {
+pub struct Bench<R: Scalar> {
     pub machine: Machine,
     pub winder: Winder<R, 3>,
-    pub drive: Drive<R>,
-    pub command: DriveCommand<R>,
-    pub m: Measurements<R>,
-    pub status: DriveStatus<R>,
+    pub drive: Drive<R::Si>,
+    pub command: DriveCommand<R::Si>,
+    pub m: Measurements<R::Si>,
+    pub status: DriveStatus<R::Si>,
     /// Torques that somebody adds at the shafts, N·m.
-    pub disturbance: BySection<R>,
-    actuators: Actuators<R>,
+    pub disturbance: BySection<R::Si>,
+    actuators: Actuators<R::Si>,
     phase_ms: u32,
 }
 
-impl<R: Float> Bench<R> {
+impl<R: Scalar> Bench<R> {
     /// A machine at standstill without web, its rolls of these radii, m.
     pub fn new(machine: &Machine, r_uw: f64, r_wu: f64) -> Self {
         Self::known_as(machine, machine, r_uw, r_uw, r_wu)
@@ -53,7 +53,7 @@ impl<R: Float> Bench<R> {
     ) -> Self {
         let mut winder = Winder::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS)).unwrap();
         let mut x = winder.state();
-        (x.r_uw, x.r_wu) = (R::of(r_uw), R::of(r_wu));
+        (x.r_uw, x.r_wu) = (R::Si::of(r_uw), R::Si::of(r_wu));
         winder.set_state(&x);
         let o = &machine.operation;
         let mut bench = Self {
@@ -61,10 +61,10 @@ impl<R: Float> Bench<R> {
             winder,
             drive: Drive::new(description),
             command: DriveCommand {
-                acceleration: R::of(o.acceleration_m_s2),
-                jerk: R::of(o.jerk_m_s3),
-                torque_limit: BySection::all(R::of(1.5)),
-                preset: Some(R::of(preset)),
+                acceleration: R::Si::of(o.acceleration_m_s2),
+                jerk: R::Si::of(o.jerk_m_s3),
+                torque_limit: BySection::all(R::Si::of(1.5)),
+                preset: Some(R::Si::of(preset)),
                 ..DriveCommand::default()
             },
             m: Measurements::default(),
@@ -89,15 +89,15 @@ impl<R: Float> Bench<R> {
         };
         let tension = share * self.full_tension();
         // the tension reference has its ramp behind it
-        self.command.tension = R::of(tension);
+        self.command.tension = R::Si::of(tension);
         self.wait(10.0);
-        self.winder.thread_at(R::of(tension));
+        self.winder.thread_at(R::Si::of(tension));
         let mut x = self.winder.state();
         // the strain of the tension makes the roll slower than the web
         let strain = tension / (self.machine.web.stiffness_n_m * self.machine.web.width_m);
-        x.v = [R::of(v); 3];
-        x.windup = [R::of(v); 3];
-        x.omega_uw = R::of(v / x.r_uw.to_f64() / (1.0 + strain));
+        x.v = [R::Si::of(v); 3];
+        x.windup = [R::Si::of(v); 3];
+        x.omega_uw = R::Si::of(v / x.r_uw.to_f64() / (1.0 + strain));
         self.winder.set_state(&x);
         // the drives see the machine turn, and take over
         self.wait(2.0 * CYCLE);
@@ -110,7 +110,7 @@ impl<R: Float> Bench<R> {
     pub fn hold(&mut self, v: f64) {
         self.command.unwind = UnwindControl::Tension;
         self.command.drums = true;
-        self.command.v_target = R::of(v);
+        self.command.v_target = R::Si::of(v);
     }
 
     /// Full tension, N.
@@ -144,7 +144,7 @@ impl<R: Float> Bench<R> {
     }
 
     /// Tunes a loop to its end, with an eye on something in every cycle; fails after ten minutes.
-    pub fn tune_with(&mut self, of: Loop, mut look: impl FnMut(&mut Self)) -> Autotune<R> {
+    pub fn tune_with(&mut self, of: Loop, mut look: impl FnMut(&mut Self)) -> Autotune<R::Si> {
         self.command.autotune = Some(of);
         for _ in 0..60_000 {
             self.cycle();
@@ -160,17 +160,17 @@ impl<R: Float> Bench<R> {
     }
 
     /// Tunes a loop to its end.
-    pub fn tune(&mut self, of: Loop) -> Autotune<R> {
+    pub fn tune(&mut self, of: Loop) -> Autotune<R::Si> {
         self.tune_with(of, |_| ())
     }
 
     /// Ground truth: the plant's state.
     pub fn x(&self) -> State<f64, 3> {
-        self.winder.state().map(R::to_f64)
+        self.winder.state().map(Real::to_f64)
     }
 
     /// Ground truth: tensions, N.
     pub fn t(&self) -> [f64; 3] {
-        self.winder.tension().map(R::to_f64)
+        self.winder.tension().map(Real::to_f64)
     }
 }

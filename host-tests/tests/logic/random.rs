@@ -187,6 +187,7 @@ impl Caricature {
             self.gone -= 1;
             self.m.tension = 0.0;
         }
+        s.tension_at_once = self.m.tension;
         self.m.omega = BySection {
             uw: s.v_uw / 1.2,
             rd: s.v / 0.425,

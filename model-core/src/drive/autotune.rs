@@ -570,7 +570,7 @@ impl<R: Real> Tuner<R> {
             (span.stiffness, R::ONE)
         } else {
             let (mode, damping) = swing.mode(self.c.per_period);
-            let mass = span.mass * span.drum_mass / (span.mass + span.drum_mass);
+            let mass = span.mass * (span.drum_mass / (span.mass + span.drum_mass));
             (mass * (mode * mode), damping)
         };
         self.report.stiffness = stiffness;
@@ -626,9 +626,9 @@ impl<R: Real> Line<R> {
         }
         let n = R::of_i32(self.samples as i32);
         let middle = (n - R::ONE) * R::of(0.5);
-        let spread = n * (n * n - R::ONE) * R::of(1.0 / 12.0);
+        let spread = (n * n - R::ONE) * R::of(1.0 / 12.0);
         Slope {
-            rate: (self.moment - middle * self.sum) / spread * per_period,
+            rate: (self.moment - middle * self.sum) / n / spread * per_period,
             mean: self.first + self.sum / n,
             samples: self.samples,
         }

@@ -58,6 +58,9 @@ pub struct Drive<R: Real> {
     kept: Option<Tuning<R>>,
     /// Tension above which there is a web to measure a diameter by, N.
     web_present: R,
+    /// 1/(1 − exp(−T/τ)) of the load cells' filter, and what they showed a period ago, N.
+    per_filter: R,
+    last_tension: R,
     /// The unwind's brake has been called to help.
     assisted: bool,
 }
@@ -98,6 +101,8 @@ impl<R: Real> Drive<R> {
             tuner: Tuner::new(machine, period),
             kept: None,
             web_present: R::of(0.5 * full * machine.operation.stall_share),
+            per_filter: R::of(-1.0 / libm::expm1(-period / machine.load_cells.filter_s)),
+            last_tension: R::ZERO,
             assisted: false,
         }
     }
@@ -141,7 +146,9 @@ impl<R: Real> Drive<R> {
             handling: command.handling,
             faults: command.faults,
         };
-        (actuators, self.status(m, v, torque))
+        let status = self.status(m, v, torque);
+        self.last_tension = m.tension;
+        (actuators, status)
     }
 
     fn follow_references(&mut self, command: &DriveCommand<R>, v: R, tuned: Option<Loop>) {
@@ -370,6 +377,7 @@ impl<R: Real> Drive<R> {
             v_uw: m.omega.uw * r_uw,
             r_uw,
             tension_ref: self.tension.value(),
+            tension_at_once: self.last_tension + self.per_filter * (m.tension - self.last_tension),
             torque,
             load: torque.zip(self.motors).map(|(t, motor)| motor.load(t)),
             power: torque.zip(m.omega).map(|(t, omega)| t * omega),

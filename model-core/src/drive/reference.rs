@@ -55,6 +55,9 @@ impl<R: Real> SCurve<R> {
     /// is all but gone, arrives.
     pub fn step(&mut self, target: R, rate: R, jerk: R) {
         let distance = target - self.value();
+        if distance == R::ZERO && self.rate == R::ZERO {
+            return;
+        }
         let change = jerk * self.period;
         let half = change * R::of(0.5);
         let rounding = (half * half + (jerk + jerk) * distance.abs()).sqrt() - half;

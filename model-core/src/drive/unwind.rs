@@ -219,8 +219,12 @@ impl<R: Real> Unwind<R> {
         let open_loop = self.feed_forward(task, m) + path - task.tension_ref;
         let error = task.tension_ref - m.tension;
         let bound = c.trim_limit * k.per_r;
+        let crawl = (R::ONE - task.v.abs() * c.per_max_speed).max(R::ZERO);
+        let fast = roll.error - self.slow_error;
+        let damping = k.tuning.damping * crawl * k.mode * k.mass * fast;
         if roll.entered {
-            // bumpless: the trim takes up where the torque stands
+            // bumpless: the trim takes up where the torque stands. The damping is left out, for what swings now does
+            // not stay
             let trim = open_loop - self.torque * k.per_r;
             self.tension
                 .start_at(&k.tension_gains, error, trim.limit(bound));
@@ -231,9 +235,6 @@ impl<R: Real> Unwind<R> {
         self.trim = self
             .tension
             .step(&k.tension_gains, error, R::ZERO, -bound, bound);
-        let crawl = (R::ONE - task.v.abs() * c.per_max_speed).max(R::ZERO);
-        let fast = roll.error - self.slow_error;
-        let damping = k.tuning.damping * crawl * k.mode * k.mass * fast;
         open_loop - self.trim - damping
     }
 

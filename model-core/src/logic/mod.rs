@@ -40,14 +40,12 @@ use crate::machine::Machine;
 use crate::profidrive::stw1;
 use crate::real::Real;
 use bus::Bus;
-use detection::{Heartbeat, Persistent, Unfiltered};
+use detection::{Heartbeat, Persistent};
 use faults::{Faults, Look, Patience, Reaction};
 use table::{Cause, Condition, Outcome};
 
 /// Drive cycles in a second.
 const CYCLES_PER_S: u16 = 100;
-/// A drive cycle, s.
-const CYCLE_S: f64 = 1.0 / CYCLES_PER_S as f64;
 /// Tension counts as detected above this share of the stall tension …
 const TENSION_DETECTED: f64 = 0.5;
 /// … for this time.
@@ -110,7 +108,6 @@ pub struct Logic<R> {
     web_threaded: bool,
     preset_taken: bool,
     tension: Persistent,
-    tension_now: Unfiltered<R>,
     tension_lost: Persistent,
     heartbeat_plc: Heartbeat,
     heartbeat: u16,
@@ -212,7 +209,6 @@ impl<R: Real> Logic<R> {
             web_threaded: false,
             preset_taken: false,
             tension: Persistent::default(),
-            tension_now: Unfiltered::new(machine.load_cells.filter_s, CYCLE_S),
             tension_lost: Persistent::default(),
             heartbeat_plc: Heartbeat::default(),
             heartbeat: 0,
@@ -383,11 +379,11 @@ impl<R: Real> Logic<R> {
         let held = self.holds_tension();
         self.tension
             .step(m.tension > c.detected * stall, TENSION_CYCLES);
-        let now = self.tension_now.step(m.tension);
         let look = self.look(sight);
         self.faults.watch(&look, &self.patience);
 
-        let lost = held && now < c.lost * sight.drive.tension_ref;
+        let drive = sight.drive;
+        let lost = held && drive.tension_at_once < c.lost * drive.tension_ref;
         let patience = if sight.drive.v.abs() > c.web_break_speed {
             WEB_BREAK_CYCLES
         } else {
