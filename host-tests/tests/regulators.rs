@@ -483,9 +483,9 @@ mod closed_loop {
         let mut o = running();
         let estimate = o.value(&image::D_UW);
         o.simulator.plant.winder_mut().break_web();
-        // 100 ms of detection, after a filter of 50 ms has fallen to 20 %: 80 ms
+        // 100 ms below 20 %: the load cells' filter of 50 ms, which alone takes 80 ms to get there, is undone
         let found = o.until(1.0, |o| o.mode() == Mode::WebBreakStop);
-        near("detection", found, 0.18, 0.02);
+        near("detection", found, 0.11, 0.02);
         assert_eq!(o.fault(), Fault::WebBreak);
         assert!(o.is(status::WEB_BREAK | status::FAULT) && !o.is(status::WEB_THREADED));
         let stop = o.until(60.0, |o| o.mode() != Mode::WebBreakStop);

@@ -36,7 +36,7 @@ enum Command {
     /// The file is what `--machine` takes. One of your own names a preset and what differs from it.
     Machine(machine::Args),
     /// Print the signal list as CSV
-    Signals,
+    Signals(signals::Args),
 }
 
 /// What a shell says of a program that Ctrl-C has ended: 128 + SIGINT.
@@ -55,7 +55,7 @@ fn main() -> ExitCode {
 
 fn run(cli: Cli) -> Result<ExitCode> {
     match cli.command {
-        Command::Signals => signals::main(),
+        Command::Signals(args) => signals::main(&args),
         Command::Machine(args) => machine::main(&args),
         Command::Plant(options) => {
             plant::run(&options, &mut std::io::stdout().lock())?;

@@ -17,6 +17,7 @@ use model_core::simulator::Simulator;
 pub const CYCLE: f64 = 1e-3 * DRIVE_PERIOD_MS as f64;
 
 /// The operator at the simulator.
+#[derive(Clone)]
 pub struct Operator<R: Float> {
     pub simulator: Simulator<R, 3>,
     pub image: Image,

@@ -144,6 +144,7 @@ impl<R: Real> Drive<R> {
                 ..command.brakes
             },
             handling: command.handling,
+            faults: command.faults,
         };
         let status = self.status(m, v, torque);
         self.last_tension = m.tension;
@@ -153,7 +154,8 @@ impl<R: Real> Drive<R> {
     fn follow_references(&mut self, command: &DriveCommand<R>, v: R, tuned: Option<Loop>) {
         let (rate, jerk) = self.tension_rate;
         self.tension.step(command.tension, rate, jerk);
-        if !command.drums || tuned == Some(Loop::DrumSpeed) {
+        let alone = command.unwind == UnwindControl::Speed;
+        if !(command.drums || alone) || tuned == Some(Loop::DrumSpeed) {
             self.speed.set(v);
         } else if !command.freeze_ramp {
             self.speed

@@ -42,9 +42,13 @@ impl<A: Arithmetic, const SPANS: usize> Offsets<A, SPANS> {
 /// The eccentric rolls and how far they have turned.
 #[derive(Clone, Debug)]
 pub struct Eccentricity<R, const SPANS: usize> {
+    /// The machine's own rolls are eccentric.
+    own: bool,
     present: bool,
     period: R,
     uw: Roll<R>,
+    /// The parent roll's own eccentricity, m.
+    uw_own: R,
     rolls: [Roll<R>; SPANS],
     /// 1/R of the roll at the end of each span, 1/m; zero where it is round.
     per_radius: [R; SPANS],
@@ -84,10 +88,13 @@ impl<R: Real, const SPANS: usize> Eccentricity<R, SPANS> {
         };
         let idle = |i: usize| machine.idle.get(i);
         let parent = machine.parent_roll.eccentricity_m;
+        let own = parent > 0.0 || machine.idle.iter().any(|roll| roll.eccentricity_m > 0.0);
         Self {
-            present: parent > 0.0 || machine.idle.iter().any(|roll| roll.eccentricity_m > 0.0),
+            own,
+            present: own,
             period: R::of(h),
             uw: roll(0, parent),
+            uw_own: R::of(parent),
             rolls: core::array::from_fn(|i| roll(i + 1, idle(i).map_or(0.0, |r| r.eccentricity_m))),
             per_radius: core::array::from_fn(|i| {
                 idle(i).map_or(R::ZERO, |r| R::of(1.0 / r.radius_m))
@@ -98,6 +105,12 @@ impl<R: Real, const SPANS: usize> Eccentricity<R, SPANS> {
     /// Any roll is eccentric.
     pub fn present(&self) -> bool {
         self.present
+    }
+
+    /// A parent roll that is eccentric by `more`, m, beside the machine's own.
+    pub fn add_to_parent_roll(&mut self, more: R) {
+        self.present = self.own || more > R::ZERO;
+        self.uw.eccentricity = self.uw_own + more;
     }
 
     /// The deviations of the step that starts at `x`.

@@ -19,7 +19,7 @@ pub mod span;
 pub mod units;
 pub mod windup;
 
-use crate::exchange::{Actuators, Brakes, BySection, Measurements};
+use crate::exchange::{Actuators, Brakes, BySection, MachineFaults, Measurements, SensorFaults};
 use crate::machine::{Machine, MachineError};
 use crate::real::{Accumulator, Real, Ring, Scalar};
 use contact::{Contact, Holding, ParentRoll, Traction};
@@ -57,6 +57,8 @@ pub struct Winder<R: Scalar, const SPANS: usize> {
     web: Web<R, SPANS>,
     /// The web is led through the machine and whole.
     threaded: bool,
+    /// The span in which it has parted last, counted from the unwind; 0 while it is whole.
+    broken_span: u8,
     delay: Brakes<Delay>,
     closed: Brakes<bool>,
     nips: [Nip<R::Si>; ROLLS],
@@ -164,6 +166,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             apart: [zero; ROLLS],
             web: Web::none(),
             threaded: false,
+            broken_span: 0,
             delay: Brakes::all(Delay::new(machine.brakes.delay_s, h)),
             closed: Brakes::default(),
             nips: [Nip::Sticks; ROLLS],
@@ -179,17 +182,18 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     /// One step of h: what people do, the brakes, the motion, the web's strength, the sensors.
     pub fn step(&mut self, actuators: &Actuators<R::Si>) -> Measurements<R::Si> {
         self.handle(actuators);
+        let (brakes, stuck) = (actuators.brakes, actuators.faults.machine.brakes);
         self.closed = Brakes {
-            uw: self.delay.uw.step(actuators.brakes.uw),
-            rd: self.delay.rd.step(actuators.brakes.rd),
-            fd: self.delay.fd.step(actuators.brakes.fd),
+            uw: stuck.uw.acts_on(self.delay.uw.step(brakes.uw)),
+            rd: stuck.rd.acts_on(self.delay.rd.step(brakes.rd)),
+            fd: stuck.fd.acts_on(self.delay.fd.step(brakes.fd)),
         };
         self.state.travel = R::Sum::at(R::ZERO);
         for _ in 0..self.substeps {
             self.advance(actuators);
             self.break_web_if_due();
         }
-        self.measure()
+        self.measure(&actuators.faults.sensors)
     }
 
     /// Steps of integration in one step of the winder: more than one where light rolls or short spans make a
@@ -209,6 +213,17 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         self.threaded = false;
         self.state.strain = [R::Sum::at(R::ZERO); SPANS];
         self.web = Web::none();
+    }
+
+    /// The same in the span of an index.
+    fn break_web_in(&mut self, span: usize) {
+        self.break_web();
+        self.broken_span = (span.min(SPANS - 1) + 1) as u8;
+    }
+
+    /// The span in which the web has parted, counted from the unwind; 0 while it is whole, or taken out.
+    pub fn broken_span(&self) -> u8 {
+        self.broken_span
     }
 
     /// The state variables in SI: ground truth, for records and tests.
@@ -278,13 +293,40 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         if handling.new_parent_roll {
             self.state.r_uw = R::Sum::at(limits.full_radius);
         }
-        if handling.thread_web && !self.threaded {
-            self.thread_with(limits.threaded_strain);
+        let strain = limits.threaded_strain;
+        if handling.remove_web {
+            self.break_web();
+            self.broken_span = 0;
         }
+        if handling.thread_web && !self.threaded {
+            // whoever leads the web over idle rolls stops them
+            self.state.v[..SPANS - 1].fill(R::Sum::at(R::ZERO));
+            self.thread_with(strain);
+        }
+        self.suffer(&actuators.faults.machine);
+    }
+
+    /// The faults that a test puts into the machine.
+    fn suffer(&mut self, faults: &MachineFaults<R::Si>) {
+        if faults.parent_roll_expired {
+            self.state.r_uw = R::Sum::at(self.limits.expire_radius);
+        }
+        if let Some(span) = faults.web_break.checked_sub(1)
+            && self.threaded
+        {
+            self.break_web_in(span.into());
+        }
+        // drums once worn may slip from then on; a nip that sticks computes what a whole windup does
+        if self.holders.nips.wear(faults.drum_wear) && !self.holders.slips {
+            self.holders.slips = true;
+            self.apart = [self.state.v[SPANS - 1]; ROLLS];
+        }
+        self.eccentricity.add_to_parent_roll(faults.eccentricity);
     }
 
     fn thread_with(&mut self, strain: R) {
         self.threaded = true;
+        self.broken_span = 0;
         self.state.strain = [R::Sum::at(strain); SPANS];
         self.look_at_web(&None);
     }
@@ -493,18 +535,19 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let limits = &self.limits;
         // what is not a number holds nothing
         let holds = |t: &R| *t <= limits.strength;
-        let torn = !self.web.tension.iter().all(holds);
+        let torn = self.web.tension.iter().position(|t| !holds(t));
         let expired = self.state.r_uw.value() <= limits.expire_radius;
         let pulled_off = self.state.r_wu.value() < limits.bare_radius;
         if pulled_off {
             self.state.r_wu = R::Sum::at(limits.core_radius);
         }
-        if self.threaded && (torn || expired || pulled_off) {
-            self.break_web();
+        if self.threaded && (torn.is_some() || expired || pulled_off) {
+            let first = if expired { 0 } else { SPANS - 1 };
+            self.break_web_in(torn.unwrap_or(first));
         }
     }
 
-    fn measure(&mut self) -> Measurements<R::Si> {
+    fn measure(&mut self, faults: &SensorFaults<R::Si>) -> Measurements<R::Si> {
         let (x, scale) = (&self.state, &self.scale);
         let speed = |sum: &R::Sum| sum.value().to_si(scale.speed);
         let v_rd = speed(&x.v[SPANS - 1]);
@@ -521,7 +564,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let tension = self.tension();
         Measurements {
             brakes: self.closed,
-            ..self.sensors.look(&sight, &tension)
+            ..self.sensors.look(&sight, &tension, faults)
         }
     }
 }
