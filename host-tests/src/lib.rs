@@ -14,6 +14,7 @@ pub mod plc;
 pub mod plot;
 pub mod qemu;
 pub mod report;
+pub mod scenario;
 pub mod setup;
 pub mod signals;
 pub mod simulator;

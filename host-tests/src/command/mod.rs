@@ -2,6 +2,8 @@
 
 pub mod demo;
 pub mod machine;
+pub mod replay;
 pub mod run;
+pub mod scenario;
 pub mod signals;
 pub mod test;
