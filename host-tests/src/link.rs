@@ -1,13 +1,14 @@
 //! The process image over Modbus TCP, seen from the PLC.
 //!
-//! Not here: single signals, coils, reconnecting. A PLC reads the whole feedback block and writes the whole
-//! command block, one request each, so that what belongs together travels together.
+//! Not here: single signals, coils, reconnecting. A PLC reads the whole feedback block and writes all of its own
+//! commands, one request each, so that what belongs together travels together. The faults that somebody else puts in
+//! stand behind its commands and are none of its business.
 
 use std::net::SocketAddr;
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
-use model_core::image::{Commands, FEEDBACK_WORDS, Feedback};
+use model_core::image::{Commands, FEEDBACK_WORDS, Feedback, PLC_COMMAND_WORDS};
 use tokio_modbus::client::sync::{self, Reader as _, Writer as _};
 
 /// An answer takes milliseconds; this long without one, the simulator is gone.
@@ -45,10 +46,10 @@ impl Link {
         Ok(Feedback { words })
     }
 
-    /// Writes the command block (function code 16).
+    /// Writes the commands of a winder PLC (function code 16).
     pub fn write(&mut self, commands: &Commands) -> Result<()> {
         self.context
-            .write_multiple_registers(0, &commands.words)
+            .write_multiple_registers(0, &commands.words[..PLC_COMMAND_WORDS])
             .map_err(anyhow::Error::from)
             .and_then(|answer| answer.map_err(|exception| anyhow!("exception: {exception}")))
             .with_context(|| self.failed("write the command block"))

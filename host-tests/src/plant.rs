@@ -24,7 +24,7 @@ use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::machine::{MAX_SPANS, Machine, PRESETS};
 use model_core::plant::windup::ROLLS;
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
-use model_core::real::Real;
+use model_core::real::{self, Real};
 
 use crate::machine_file::Description;
 
@@ -126,7 +126,7 @@ struct Incidents {
 }
 
 impl Incidents {
-    fn of<R: Real, const SPANS: usize>(winder: &Winder<R, SPANS>) -> Self {
+    fn of<R: real::Scalar, const SPANS: usize>(winder: &Winder<R, SPANS>) -> Self {
         let winding = winder.winding();
         Self {
             web_broken: !winder.threaded(),
@@ -333,7 +333,7 @@ fn switch(column: &str, field: &str) -> Result<bool> {
 }
 
 /// [`simulate_spans`] with the machine's number of spans.
-fn simulate<R: Real>(
+fn simulate<R: model_core::real::Scalar>(
     machine: &Machine,
     schedule: &Schedule,
     every: u64,
@@ -352,14 +352,14 @@ fn simulate<R: Real>(
 }
 
 /// Runs the plant and writes a row at the start and every `every` steps.
-fn simulate_spans<R: Real, const SPANS: usize>(
+fn simulate_spans<R: real::Scalar, const SPANS: usize>(
     machine: &Machine,
     schedule: &Schedule,
     every: u64,
     out: &mut dyn Write,
 ) -> Result<Run> {
     let mut winder = Winder::<R, SPANS>::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS))?;
-    winder.thread_at(R::of(stall_tension(machine)));
+    winder.thread_at(R::Si::of(stall_tension(machine)));
     writeln!(out, "{}", header(SPANS))?;
     write_row(out, 0, &winder)?;
     let mut run = Run {
@@ -375,7 +375,7 @@ fn simulate_spans<R: Real, const SPANS: usize>(
     let mut before = Incidents::of(&winder);
     for (step, row) in (1_u64..).zip(schedule.steps()) {
         winder.step(&Actuators {
-            torque: row.torque.map(R::of),
+            torque: row.torque.map(R::Si::of),
             brakes: row.brakes,
             ..Actuators::default()
         });
@@ -416,7 +416,7 @@ fn seconds(step: u64) -> f64 {
 }
 
 /// One row of the output. `Debug` gives the shortest digits that read back as the same number.
-fn write_row<R: Real, const SPANS: usize>(
+fn write_row<R: real::Scalar, const SPANS: usize>(
     out: &mut dyn Write,
     step: u64,
     winder: &Winder<R, SPANS>,

@@ -272,6 +272,8 @@ fn strip(out: &mut Svg, spans: &[Span], time: &Axis, y: f64) {
             Some(Mode::EmergencyStop) => ("#f6c9c4", "emergency stop"),
             Some(Mode::CoastStop) => ("#f6c9c4", "coast stop"),
             Some(Mode::WebBreakStop) => ("#f6c9c4", "web break"),
+            Some(Mode::UnwindManeuver) => ("#e3e0f2", "unwind maneuver"),
+            Some(Mode::AutoTune) => ("#d9ecec", "auto-tune"),
             Some(Mode::Ready) => ("#f1f3f5", "ready"),
             Some(Mode::Off) => ("#f1f3f5", "off"),
             None => ("#f6c9c4", "unknown mode"),

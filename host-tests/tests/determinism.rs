@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 
 use model_core::image::{self, Commands};
 use model_core::logic::{Mode, command};
-use model_core::real::Real;
+use model_core::real::Float;
 use operator::{CYCLE, Operator};
 
 /// Diameter of the finished roll, m.
@@ -21,7 +21,7 @@ const STOP: f64 = 1535.08;
 const RUN: f64 = 2200.0 / 60.0;
 
 /// Winds the default set: new rolls, preset, drives on, thread, run, normal stop at 1.25 m, stall tension. Gives the commands of every drive cycle.
-fn wind<R: Real>(o: &mut Operator<R>, mut look: impl FnMut(&Operator<R>)) -> Vec<Commands> {
+fn wind<R: Float>(o: &mut Operator<R>, mut look: impl FnMut(&Operator<R>)) -> Vec<Commands> {
     let roll = &o.machine.shipping_roll;
     let area = PI * ((0.5 * DIAMETER).powi(2) - roll.core_radius_m.powi(2));
     let length = area / o.machine.web.caliper_m;

@@ -12,7 +12,7 @@ use model_core::image;
 use model_core::logic::{Fault, Mode, Refusal, command, status};
 use model_core::machine::Machine;
 use model_core::profidrive::{stw1, zsw1};
-use model_core::real::Real;
+use model_core::real::Float;
 use operator::{CYCLE, Operator};
 use proptest::prelude::*;
 
@@ -36,13 +36,13 @@ mod s_curve {
     const JERK: f64 = 0.20;
 
     /// A curve with an eye on its limits.
-    struct Watched<R: Real> {
+    struct Watched<R: Float> {
         curve: SCurve<R>,
         rate: f64,
         jerk: f64,
     }
 
-    impl<R: Real> Watched<R> {
+    impl<R: Float> Watched<R> {
         fn at(value: f64) -> Self {
             let mut curve = SCurve::new(CYCLE);
             curve.set(R::of(value));
@@ -80,7 +80,7 @@ mod s_curve {
     }
 
     /// 1 535.08 m and 83.73 s from 2 200 m/min: T = V/a + a/j, s = V·T/2. Falls all the way, and lands on 0.
-    fn a_normal_stop_takes_its_length_and_time<R: Real>() {
+    fn a_normal_stop_takes_its_length_and_time<R: Float>() {
         let time = RUN / RATE + RATE / JERK;
         near("closed form, s", time, 83.73, 0.005);
         near("closed form, m", 0.5 * RUN * time, 1535.08, 0.005);
@@ -295,7 +295,7 @@ mod closed_loop {
 
     impl Band {
         /// The speed, too, follows its reference.
-        fn look<R: Real>(&mut self, o: &Operator<R>) {
+        fn look<R: Float>(&mut self, o: &Operator<R>) {
             let status = o.simulator.status();
             near("speed", status.v.to_f64(), status.v_ref.to_f64(), 0.003);
             let measured = o.value(&image::TENSION) * o.machine.web.width_m;
@@ -455,9 +455,9 @@ mod closed_loop {
         let mut o = running();
         let estimate = o.value(&image::D_UW);
         o.simulator.plant.winder_mut().break_web();
-        // 100 ms of detection, after a filter of 50 ms has fallen to 20 %: 80 ms
+        // 100 ms below 20 %: the load cells' filter of 50 ms, which alone takes 80 ms to get there, is undone
         let found = o.until(1.0, |o| o.mode() == Mode::WebBreakStop);
-        near("detection", found, 0.18, 0.02);
+        near("detection", found, 0.11, 0.02);
         assert_eq!(o.fault(), Fault::WebBreak);
         assert!(o.is(status::WEB_BREAK | status::FAULT) && !o.is(status::WEB_THREADED));
         let stop = o.until(60.0, |o| o.mode() != Mode::WebBreakStop);

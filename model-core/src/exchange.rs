@@ -74,6 +74,70 @@ pub struct Handling {
     pub new_core: bool,
     /// Put in a full parent roll.
     pub new_parent_roll: bool,
+    /// Cut the web and take it out.
+    pub remove_web: bool,
+}
+
+/// How a brake fails.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stuck {
+    /// It works.
+    #[default]
+    No,
+    /// It does not close.
+    Open,
+    /// It does not open.
+    Closed,
+}
+
+impl Stuck {
+    /// What becomes of a brake that should be closed or not.
+    pub fn acts_on(self, closed: bool) -> bool {
+        match self {
+            Stuck::No => closed,
+            Stuck::Open => false,
+            Stuck::Closed => true,
+        }
+    }
+}
+
+/// Faults of the machine that a test puts in. Each is a level: it may stand for any time, and ends when taken back.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MachineFaults<R> {
+    /// The web parts in this span, counted from the unwind; 0 leaves it whole.
+    pub web_break: u8,
+    /// The parent roll has run down to its expire radius.
+    pub parent_roll_expired: bool,
+    /// Brakes that do not follow.
+    pub brakes: Brakes<Stuck>,
+    /// Share of their friction that the drums have lost.
+    pub drum_wear: R,
+    /// Eccentricity of the parent roll beside the machine's own, m.
+    pub eccentricity: R,
+}
+
+/// Faults of sensors that a test puts in, levels as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SensorFaults<R> {
+    /// The unwind's encoder is silent.
+    pub encoder_uw: bool,
+    /// The rear drum's encoder is silent.
+    pub encoder_rd: bool,
+    /// The load cells show what they last showed.
+    pub load_cell_stuck: bool,
+    /// Error of the load cells' wrap angle, rad.
+    pub wrap_error: R,
+    /// The load cells' zero wanders off by so much in a second, N/s; it is back when there is no drift.
+    pub drift: R,
+}
+
+/// All that a test puts in between drives and sensors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Faults<R> {
+    /// Of the machine.
+    pub machine: MachineFaults<R>,
+    /// Of its sensors.
+    pub sensors: SensorFaults<R>,
 }
 
 /// What acts on the winder: from the drive task to the plant task.
@@ -85,6 +149,8 @@ pub struct Actuators<R> {
     pub brakes: Brakes<bool>,
     /// What people do.
     pub handling: Handling,
+    /// Faults that a test puts in.
+    pub faults: Faults<R>,
 }
 
 /// What can be measured on a winder: from the plant task to the drive task.
@@ -112,7 +178,7 @@ pub enum UnwindControl {
     TakeUp,
     /// Tension.
     Tension,
-    /// Speed, to stop the roll after a web break.
+    /// Speed, without web: to turn the roll alone, or to stop it after a web break.
     Speed,
 }
 
@@ -147,6 +213,8 @@ pub struct DriveCommand<R> {
     pub brakes: Brakes<bool>,
     /// What people do, handed on to the plant.
     pub handling: Handling,
+    /// Faults that a test puts in, handed on to the plant.
+    pub faults: Faults<R>,
 }
 
 /// What the regulators tell the logic after a drive cycle.

@@ -3,7 +3,9 @@
 //! Not here: how a signal travels (that is a link's) and what it does (that is the logic's). Modbus registers,
 //! the HMI's interface and the signal list all come from [`SIGNALS`].
 //!
-//! Two blocks of 16-bit words, commands from the PLC and feedback to it, without holes. A value is a scaled
+//! Two blocks of 16-bit words, commands from the PLC and feedback to it, without holes. The commands of a winder PLC
+//! come first; behind them stand the faults that a test puts in, out of reach of a PLC that writes its own words. A
+//! block is only ever added to: an address keeps its meaning. A value is a scaled
 //! integer; a 32-bit counter takes two words, high word first. Bit `b` of word `w` is also the single bit
 //! `16·w + b` of the block, so that a PLC can use coils or words as it likes.
 
@@ -68,6 +70,23 @@ signals! {
     TORQUE_LIMIT_DRUMS: Command 14, RearDrum, U16, "%", 10.0, 0.0 ..= 150.0, "Torque limit of both drum motors, of rated torque";
     FRONT_SHARE_TRIM: Command 15, FrontDrum, I16, "%", 10.0, -20.0 ..= 20.0, "Added to the drive's own table of the front drum's share of the drum torque";
 
+    D_PRESET_2_UW:    Command 16, Unwind, U16, "mm", 10.0, 100.0 ..= 4000.0, "Second parent-roll diameter, taken over with preset_accept while preset_2 is set";
+    V_JOG_SET:        Command 17, Unwind, U16, "m/min", 10.0, 10.0 ..= 25.0, "Surface speed of the parent roll in the unwind maneuver";
+    AUTOTUNE_LOOP:    Command 18, Winder, Code(logic::LOOPS), "", 1.0, 0.0 ..= 2.0, "Loop that autotune tunes";
+    HEARTBEAT_TIME:   Command 19, Winder, U16, "ms", 1.0, 100.0 ..= 10000.0, "The PLC's heartbeat may stand still for this long";
+
+    // what a test puts in: beyond the words of a winder PLC, so that its writes do not touch it; 0 is always sound
+    FAULT_MACHINE:    Command 20, Simulator, Bits(logic::MACHINE_FAULT_BITS), "", 1.0, 0.0 ..= 65535.0, "Faults of the machine";
+    FAULT_WEB_BREAK:  Command 21, Simulator, U16, "", 1.0, 0.0 ..= 16.0, "Breaks the web in this span, counted from the unwind; 0 leaves it whole";
+    FAULT_DRUM_WEAR:  Command 22, Simulator, U16, "%", 10.0, 0.0 ..= 100.0, "Friction that the drums have lost; the rolls of the windup may slip from then on";
+    FAULT_ECCENTRICITY_UW: Command 23, Simulator, U16, "mm", 10.0, 0.0 ..= 20.0, "Eccentricity of the parent roll beside the machine's own";
+    FAULT_SENSORS:    Command 24, Simulator, Bits(logic::SENSOR_FAULT_BITS), "", 1.0, 0.0 ..= 65535.0, "Faults of sensors";
+    FAULT_WRAP_ANGLE: Command 25, Simulator, I16, "°", 10.0, -20.0 ..= 20.0, "Error of the wrap angle on the load cells";
+    FAULT_LOAD_CELL_DRIFT: Command 26, Simulator, I16, "N/m/min", 1.0, -1000.0 ..= 1000.0, "The load cells' zero wanders off, per width and minute; 0 puts it back";
+    FAULT_DRIVES:     Command 27, Simulator, Bits(logic::DRIVE_FAULT_BITS), "", 1.0, 0.0 ..= 65535.0, "Faults of the drives";
+    FAULT_PRESET:     Command 28, Simulator, I16, "%", 10.0, -10.0 ..= 10.0, "Error of a diameter preset when the drive takes it over";
+    BUS_DELAY:        Command 29, Simulator, U16, "", 1.0, 1.0 ..= 10.0, "Drive cycles from a command to its effect, and from a feedback to its sight";
+
     // what the drive system answers
     HEARTBEAT:        Feedback 0,  Winder, U16, "", 1.0, 0.0 ..= 65535.0, "Counts up by one each drive cycle of 10 ms";
     WINDER_STATUS:    Feedback 1,  Winder, Bits(logic::STATUS_BITS), "", 1.0, 0.0 ..= 65535.0, "State of the winder's drive logic";
@@ -110,10 +129,20 @@ signals! {
     DRIVE_TIME_MAX:   Feedback 40, Simulator, U16, "µs", 1.0, 0.0 ..= 65535.0, "Longest regulator activation";
     DRIVE_JITTER_MAX: Feedback 41, Simulator, U16, "µs", 1.0, 0.0 ..= 65535.0, "Latest start of a regulator activation";
     LOGIC_OVERRUNS:   Feedback 42, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Drive cycles in which the drive logic did not get its turn";
+
+    // more of the drive system
+    WARNINGS:         Feedback 43, Winder, Bits(logic::WARNING_BITS), "", 1.0, 0.0 ..= 65535.0, "Warnings that stand";
 }
+
+/// Jog speed at power-up, m/min.
+const JOG_M_MIN: f32 = 15.0;
+/// Heartbeat time at power-up, ms: a dozen cycles of a slow PLC.
+const HEARTBEAT_MS: f32 = 500.0;
 
 /// Words in the block of commands.
 pub const COMMAND_WORDS: usize = block_words(Direction::Command);
+/// Words of it that are a winder PLC's; what follows is the simulator's own.
+pub const PLC_COMMAND_WORDS: usize = FAULT_MACHINE.word as usize;
 /// Words in the block of feedback.
 pub const FEEDBACK_WORDS: usize = block_words(Direction::Feedback);
 
@@ -220,6 +249,10 @@ impl Commands {
         block.set(&ACCEL_SET, o.acceleration_m_s2);
         block.set(&JERK_SET, o.jerk_m_s3);
         block.set(&D_PRESET_UW, 2.0e3 * machine.parent_roll.full_radius_m);
+        block.set(&D_PRESET_2_UW, 2.0e3 * machine.parent_roll.full_radius_m);
+        block.set(&V_JOG_SET, JOG_M_MIN);
+        block.set(&HEARTBEAT_TIME, HEARTBEAT_MS);
+        block.set(&BUS_DELAY, 1.0);
         block.set(&TORQUE_LIMIT_UW, 150.0);
         block.set(&TORQUE_LIMIT_DRUMS, 150.0);
         block
@@ -247,6 +280,20 @@ mod tests {
                 assert_eq!(s.word, next, "{}", s.name);
                 next += s.kind.words();
             }
+        }
+    }
+
+    /// A winder PLC writes the first words and nothing of the simulator's.
+    #[test]
+    fn the_words_of_the_plc_come_first() {
+        for s in SIGNALS.iter().filter(|s| s.direction == Direction::Command) {
+            let of_simulator = s.section == Section::Simulator;
+            assert_eq!(
+                of_simulator,
+                usize::from(s.word) >= PLC_COMMAND_WORDS,
+                "{}",
+                s.name
+            );
         }
     }
 

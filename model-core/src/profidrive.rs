@@ -1,6 +1,6 @@
 //! Control and status words of PROFIdrive, speed-control mode.
 //!
-//! Not here: jogging, and the words of positioning mode. Bits 0–10 only; they also match the ABB Drives
+//! Not here: the words of positioning mode. Bits 0–10 only; all but the two of jogging also match the ABB Drives
 //! profile. Source: PROFIdrive profile 4.2 (PNO 3.172), STW1, ZSW1 and the general state machine.
 
 use crate::signal::Bit;
@@ -23,6 +23,10 @@ pub mod stw1 {
     pub const ENABLE_SETPOINT: u16 = 1 << 6;
     /// Rising edge acknowledges faults.
     pub const ACKNOWLEDGE: u16 = 1 << 7;
+    /// Jog 1; counts while ramp generator and set-point are not enabled (bits 4 to 6 are 0).
+    pub const JOG_1: u16 = 1 << 8;
+    /// Jog 2, likewise.
+    pub const JOG_2: u16 = 1 << 9;
     /// The PLC has control; 0 keeps the last valid word.
     pub const CONTROL_BY_PLC: u16 = 1 << 10;
     /// Everything enabled, not on: the first word of the start sequence.
@@ -67,6 +71,8 @@ pub const STW1_BITS: &[Bit] = &[
     Bit::new(5, "unfreeze_ramp", "0 freezes the ramp generator"),
     Bit::new(6, "enable_setpoint", "enable the set-point"),
     Bit::new(7, "acknowledge", "rising edge acknowledges faults"),
+    Bit::new(8, "jog_1", "jog 1 while bits 4 to 6 are 0: unwind forward"),
+    Bit::new(9, "jog_2", "jog 2 while bits 4 to 6 are 0: unwind backward"),
     Bit::new(10, "control_by_plc", "the PLC has control"),
 ];
 

@@ -1,23 +1,26 @@
 //! The numbers the models compute with, and sums that lose nothing.
 //!
-//! Not here: units, conversions, transcendental functions. A step uses `+ − × ÷`, comparison, a square
-//! root in references and nips, and a cosine where a roll is eccentric. The first are correctly rounded on every
-//! machine, the last two come from one library in software, and nothing is fused: the same inputs give the same bits
-//! on a PC and on a microcontroller.
+//! Not here: fixed-point numbers, which have a module of their own.
+//!
+//! There are two traits. [`Real`] is a number in SI units: regulators, logic, sensors, brakes and nips compute with
+//! it. [`Arithmetic`] is the little that the motion of the winder needs, the part of the plant that is evaluated four
+//! times a step; a number that has it may count its quantities in units of its own, see
+//! [`Units`](crate::plant::units::Units), and may stand for several winders side by side. A [`Scalar`] is one winder's.
+//!
+//! Computed are `+ − × ÷`, comparison, a square root in references and nips, and a cosine where a roll is eccentric.
+//! The first are correctly rounded on every machine, the last two come from one library in software, and nothing is
+//! fused: the same inputs give the same bits on a PC and on a microcontroller.
 
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// A scalar the winder and its regulators can be computed in.
-pub trait Real:
+/// What can be added and multiplied.
+pub trait Ring:
     Copy
     + Debug
-    + Default
-    + PartialOrd
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
-    + Div<Output = Self>
     + Neg<Output = Self>
     + AddAssign
     + SubAssign
@@ -28,7 +31,11 @@ pub trait Real:
     const ZERO: Self;
     /// 1
     const ONE: Self;
-    /// What a state of this scalar is summed up in.
+}
+
+/// A number in SI units.
+pub trait Real: Ring + Default + PartialOrd + Div<Output = Self> {
+    /// What a regulator's state is summed up in.
     type Sum: Sum<Self>;
 
     /// The nearest number; for coefficients and settings, outside the step.
@@ -43,8 +50,6 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// cos x, of an angle within ±2·π; the same bits on every machine.
     fn cos(self) -> Self;
-    /// The bits folded to 32, for comparing trajectories.
-    fn fingerprint(self) -> u32;
     /// The whole number, exactly or nearest.
     fn of_i32(n: i32) -> Self;
     /// The largest whole number that is not larger, saturating.
@@ -131,9 +136,194 @@ impl<R: Real> Sum<R> for Compensated<R> {
     }
 }
 
+/// What the motion of a winder is computed in: one number, or one for each of several winders side by side.
+///
+/// Nothing here compares, so that all of them go the same way.
+pub trait Arithmetic: Ring {
+    /// A factor between a quantity and what it changes another by.
+    type Gain: Copy + Debug + Send + 'static;
+    /// What a state changes by in a sixth of a step.
+    type Rate: Copy + Debug + Add<Output = Self::Rate> + Send + 'static;
+    /// What a state is summed up in.
+    type Sum: Accumulator<Self>;
+
+    /// max(0, x)
+    fn positive(self) -> Self;
+    /// 1 + ε
+    fn stretch(strain: Self) -> Self;
+    /// v·ε of a speed.
+    fn strained(self, strain: Self) -> Self;
+    /// EA·ε of a strain. Where strain and force are counted alike, nothing is to be done.
+    fn elastic(self, stiffness: Self) -> Self;
+    /// x/y, of a positive y.
+    fn over(self, divisor: Self) -> Self;
+    /// g/y, of a positive y.
+    fn gain_over(gain: Self::Gain, divisor: Self) -> Self::Gain;
+    /// The change g·x.
+    fn rate(self, gain: Self::Gain) -> Self::Rate;
+    /// No change.
+    fn no_rate() -> Self::Rate;
+}
+
+/// A running sum of the changes of a state.
+pub trait Accumulator<A: Arithmetic>: Copy + Debug + Send + 'static {
+    /// A sum that stands at `value`.
+    fn at(value: A) -> Self;
+    /// The sum, rounded.
+    fn value(&self) -> A;
+    /// Where half a step at a rate would lead.
+    fn after_half(&self, rate: A::Rate) -> A;
+    /// Where a step at a rate would lead.
+    fn after_whole(&self, rate: A::Rate) -> A;
+    /// Adds a change.
+    fn advance(&mut self, change: A::Rate);
+}
+
+/// What one winder's motion is computed in.
+pub trait Scalar: Arithmetic + PartialOrd + Default {
+    /// Numbers for everything else about the winder.
+    type Si: Real;
+    /// The size of a unit, for converting from and to SI.
+    type Unit: Copy + Debug + Send + 'static;
+
+    /// Whether quantities are counted in units of the machine's own; otherwise in SI.
+    const PER_UNIT: bool;
+    /// The largest coefficient that can be held, in the units that [`Scalar::PER_UNIT`] says.
+    const LARGEST: f64;
+    /// The largest factor from a quantity to a change.
+    const LARGEST_GAIN: f64;
+
+    /// The nearest number.
+    fn coefficient(x: f64) -> Self;
+    /// The nearest factor.
+    fn gain(x: f64) -> Self::Gain;
+    /// A unit of this size in SI.
+    fn unit(size: f64) -> Self::Unit;
+    /// A quantity in SI, counted in its unit; at most as much as can be.
+    fn of_si(x: Self::Si, unit: Self::Unit) -> Self;
+    /// A quantity counted in its unit, in SI.
+    fn to_si(self, unit: Self::Unit) -> Self::Si;
+    /// Whether all are within what may be computed with: finite.
+    fn sound(values: impl Iterator<Item = Self>) -> bool;
+    /// The bits folded to 32, for comparing trajectories.
+    fn fingerprint(self) -> u32;
+}
+
+/// A number that serves for everything: floating point.
+pub trait Float: Scalar<Si = Self, Rate = Self> + Real {}
+
+/// A floating-point number computes in SI, with its own operators.
+macro_rules! floating {
+    ($type:ty, $sum:ty, $fingerprint:expr) => {
+        impl Float for $type {}
+
+        impl Ring for $type {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+        }
+
+        impl Arithmetic for $type {
+            type Gain = Self;
+            type Rate = Self;
+            type Sum = $sum;
+
+            #[inline(always)]
+            fn positive(self) -> Self {
+                if self > 0.0 { self } else { 0.0 }
+            }
+            #[inline(always)]
+            fn stretch(strain: Self) -> Self {
+                1.0 + strain
+            }
+            #[inline(always)]
+            fn strained(self, strain: Self) -> Self {
+                self * strain
+            }
+            #[inline(always)]
+            fn elastic(self, stiffness: Self) -> Self {
+                stiffness * self
+            }
+            #[inline(always)]
+            fn over(self, divisor: Self) -> Self {
+                self / divisor
+            }
+            #[inline(always)]
+            fn gain_over(gain: Self, divisor: Self) -> Self {
+                gain / divisor
+            }
+            #[inline(always)]
+            fn rate(self, gain: Self) -> Self {
+                gain * self
+            }
+            #[inline(always)]
+            fn no_rate() -> Self {
+                0.0
+            }
+        }
+
+        impl Accumulator<$type> for $sum {
+            fn at(value: $type) -> Self {
+                Sum::at(value)
+            }
+            #[inline(always)]
+            fn value(&self) -> $type {
+                Sum::value(self)
+            }
+            #[inline(always)]
+            fn after_half(&self, rate: $type) -> $type {
+                Sum::value(self) + 3.0 * rate
+            }
+            #[inline(always)]
+            fn after_whole(&self, rate: $type) -> $type {
+                Sum::value(self) + 6.0 * rate
+            }
+            #[inline(always)]
+            fn advance(&mut self, change: $type) {
+                Sum::add(self, change);
+            }
+        }
+
+        impl Scalar for $type {
+            type Si = Self;
+            type Unit = ();
+
+            const PER_UNIT: bool = false;
+            const LARGEST: f64 = f64::INFINITY;
+            const LARGEST_GAIN: f64 = f64::INFINITY;
+
+            fn coefficient(x: f64) -> Self {
+                x as Self
+            }
+            fn gain(x: f64) -> Self {
+                x as Self
+            }
+            fn unit(_: f64) {}
+            #[inline(always)]
+            fn of_si(x: Self, (): ()) -> Self {
+                x
+            }
+            #[inline(always)]
+            fn to_si(self, (): ()) -> Self {
+                self
+            }
+            /// One number that is not finite makes their sum so.
+            fn sound(values: impl Iterator<Item = Self>) -> bool {
+                values.fold(0.0, |sum, x| sum + x).is_finite()
+            }
+            fn fingerprint(self) -> u32 {
+                $fingerprint(self)
+            }
+        }
+    };
+}
+
+floating!(f32, Compensated<f32>, f32::to_bits);
+floating!(f64, Plain<f64>, |x: f64| {
+    let bits = x.to_bits();
+    (bits ^ (bits >> 32)) as u32
+});
+
 impl Real for f32 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
     type Sum = Compensated<f32>;
 
     fn of(x: f64) -> Self {
@@ -164,14 +354,9 @@ impl Real for f32 {
     fn is_finite(self) -> bool {
         f32::is_finite(self)
     }
-    fn fingerprint(self) -> u32 {
-        self.to_bits()
-    }
 }
 
 impl Real for f64 {
-    const ZERO: Self = 0.0;
-    const ONE: Self = 1.0;
     type Sum = Plain<f64>;
 
     fn of(x: f64) -> Self {
@@ -201,9 +386,5 @@ impl Real for f64 {
     }
     fn is_finite(self) -> bool {
         f64::is_finite(self)
-    }
-    fn fingerprint(self) -> u32 {
-        let bits = self.to_bits();
-        (bits ^ (bits >> 32)) as u32
     }
 }

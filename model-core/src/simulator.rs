@@ -12,11 +12,11 @@ use crate::image::{self, Commands, Feedback, Image};
 use crate::logic::Logic;
 use crate::machine::{Machine, MachineError};
 use crate::plant::{PLANT_PERIOD_MS, Winder};
-use crate::real::Real;
+use crate::real::{Real, Scalar};
 
 /// The plant's part: every 4 ms.
 #[derive(Clone, Debug)]
-pub struct Plant<R: Real, const SPANS: usize> {
+pub struct Plant<R: Scalar, const SPANS: usize> {
     winder: Winder<R, SPANS>,
     record: Record,
 }
@@ -53,7 +53,7 @@ impl Default for Record {
     }
 }
 
-impl<R: Real, const SPANS: usize> Plant<R, SPANS> {
+impl<R: Scalar, const SPANS: usize> Plant<R, SPANS> {
     /// The plant of a machine; fails with the first parameter outside its limits.
     pub fn new(machine: &Machine) -> Result<Self, MachineError> {
         Ok(Self {
@@ -63,10 +63,9 @@ impl<R: Real, const SPANS: usize> Plant<R, SPANS> {
     }
 
     /// 4 ms of the winder.
-    pub fn tick(&mut self, actuators: &Actuators<R>) -> (Measurements<R>, Record) {
+    pub fn tick(&mut self, actuators: &Actuators<R::Si>) -> (Measurements<R::Si>, Record) {
         let measurements = self.winder.step(actuators);
-        self.record
-            .step(self.winder.state().iter().map(R::fingerprint));
+        self.record.step(self.winder.fingerprints());
         (measurements, self.record)
     }
 
@@ -83,23 +82,23 @@ impl<R: Real, const SPANS: usize> Plant<R, SPANS> {
 
 /// All parts in one hand, in lockstep.
 #[derive(Clone, Debug)]
-pub struct Simulator<R: Real, const SPANS: usize> {
+pub struct Simulator<R: Scalar, const SPANS: usize> {
     /// The plant's part.
     pub plant: Plant<R, SPANS>,
     /// The regulators.
-    pub drive: Drive<R>,
+    pub drive: Drive<R::Si>,
     /// The logic.
-    pub logic: Logic<R>,
-    actuators: Actuators<R>,
-    measurements: Measurements<R>,
-    command: DriveCommand<R>,
-    status: DriveStatus<R>,
+    pub logic: Logic<R::Si>,
+    actuators: Actuators<R::Si>,
+    measurements: Measurements<R::Si>,
+    command: DriveCommand<R::Si>,
+    status: DriveStatus<R::Si>,
     record: Record,
     /// Time within the common period of both tasks, ms.
     phase_ms: u32,
 }
 
-impl<R: Real, const SPANS: usize> Simulator<R, SPANS> {
+impl<R: Scalar, const SPANS: usize> Simulator<R, SPANS> {
     /// The simulator of a machine at power-up; fails with the first parameter outside its limits.
     pub fn new(machine: &Machine) -> Result<Self, MachineError> {
         Ok(Self {
@@ -140,7 +139,7 @@ impl<R: Real, const SPANS: usize> Simulator<R, SPANS> {
     }
 
     /// What the regulators told last.
-    pub fn status(&self) -> &DriveStatus<R> {
+    pub fn status(&self) -> &DriveStatus<R::Si> {
         &self.status
     }
 }

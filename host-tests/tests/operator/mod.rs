@@ -10,14 +10,14 @@ use model_core::logic::{Fault, Mode, Refusal, command, status};
 use model_core::machine::Machine;
 use model_core::plant::rk4::State;
 use model_core::profidrive::stw1;
-use model_core::real::Real;
+use model_core::real::Float;
 use model_core::simulator::Simulator;
 
 /// A drive cycle, s.
 pub const CYCLE: f64 = 1e-3 * DRIVE_PERIOD_MS as f64;
 
 /// The operator at the simulator.
-pub struct Operator<R: Real> {
+pub struct Operator<R: Float> {
     pub simulator: Simulator<R, 3>,
     pub image: Image,
     pub machine: Machine,
@@ -27,7 +27,7 @@ pub struct Operator<R: Real> {
     pub cycles: u32,
 }
 
-impl<R: Real> Operator<R> {
+impl<R: Float> Operator<R> {
     /// At power-up.
     pub fn new() -> Self {
         Self::at(Machine::news_8000())
@@ -167,11 +167,11 @@ impl<R: Real> Operator<R> {
 
     /// Ground truth: the plant's state.
     pub fn x(&self) -> State<f64, 3> {
-        self.simulator.plant.winder().state().map(Real::to_f64)
+        self.simulator.plant.winder().state().map(R::to_f64)
     }
 
     /// Ground truth: tensions, N.
     pub fn t(&self) -> [f64; 3] {
-        self.simulator.plant.winder().tension().map(Real::to_f64)
+        self.simulator.plant.winder().tension().map(R::to_f64)
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use model_core::exchange::BySection;
 use model_core::machine::{DrivenRoll, IdleRoll, Machine};
 use model_core::plant::rk4::State;
-use model_core::real::Real;
+use model_core::real::Float;
 use proptest::prelude::*;
 
 use crate::form::{self, Bench, H, RUN};
@@ -31,7 +31,7 @@ struct Balance {
 
 impl Balance {
     /// Runs the schedule with torques that would do as it says, if nothing oscillated.
-    fn of<R: Real>(bench: &mut Bench<R>, schedule: &[Stretch]) -> Self {
+    fn of<R: Float>(bench: &mut Bench<R>, schedule: &[Stretch]) -> Self {
         let m = bench.machine.clone();
         let start = bench.x();
         let (mut taken, mut travel, mut supplied, mut turnover) = (0.0, 0.0, 0.0, 0.0);
@@ -112,7 +112,7 @@ fn powers(m: &Machine, x: &State<f64, 3>, t: &[f64; 3], torque: &BySection<f64>)
 }
 
 /// Start, run, stop.
-fn a_cycle_loses_neither_paper_nor_energy<R: Real>() {
+fn a_cycle_loses_neither_paper_nor_energy<R: Float>() {
     let m = Machine::news_8000();
     let t = form::tension(&m);
     let x = form::steady(&m, 0.5, t, 1.5, 0.05);

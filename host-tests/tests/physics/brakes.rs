@@ -2,7 +2,7 @@
 
 use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::machine::Machine;
-use model_core::real::Real;
+use model_core::real::Float;
 
 use crate::form::{self, Bench, H};
 use crate::{in_both_scalars, near};
@@ -26,7 +26,7 @@ fn frictionless() -> Machine {
     m
 }
 
-fn braked<R: Real>() -> Actuators<R> {
+fn braked<R: Float>() -> Actuators<R> {
     Actuators {
         brakes: Brakes::all(true),
         ..Actuators::default()
@@ -34,7 +34,7 @@ fn braked<R: Real>() -> Actuators<R> {
 }
 
 /// Steps until the speed is exactly zero; it must stay so.
-fn time_to_stop<R: Real>(bench: &mut Bench<R>, speed: impl Fn(&Bench<R>) -> R) -> f64 {
+fn time_to_stop<R: Float>(bench: &mut Bench<R>, speed: impl Fn(&Bench<R>) -> R) -> f64 {
     let mut steps = 0;
     while speed(bench) != R::ZERO {
         assert!(speed(bench) > R::ZERO, "it turns back");
@@ -50,7 +50,7 @@ fn time_to_stop<R: Real>(bench: &mut Bench<R>, speed: impl Fn(&Bench<R>) -> R) -
 }
 
 /// T = V_0·M/F_b and ω_0·J/T_b, ± h, after the delay. No web, no other friction.
-fn a_brake_stops_in_momentum_over_force<R: Real>() {
+fn a_brake_stops_in_momentum_over_force<R: Float>() {
     let m = frictionless();
     let (b, delay) = (&m.brakes, m.brakes.delay_s);
     let force = b.rd_n_m / m.rear_drum.radius_m + b.fd_n_m / m.front_drum.radius_m;
@@ -75,7 +75,7 @@ fn a_brake_stops_in_momentum_over_force<R: Real>() {
 }
 
 /// The web under stall tension between two held rolls, the motors pulling against the brakes.
-fn a_brake_holds_the_web_at_standstill_without_creep<R: Real>() {
+fn a_brake_holds_the_web_at_standstill_without_creep<R: Float>() {
     let m = Machine::news_8000();
     let stall = m.operation.stall_share * form::tension(&m);
     let mut bench = Bench::<R>::new(m);
@@ -113,7 +113,7 @@ fn a_brake_holds_the_web_at_standstill_without_creep<R: Real>() {
 }
 
 /// With F above F_b the body accelerates by (F − F_b)/M.
-fn a_brake_that_is_too_weak_slips_by_the_difference<R: Real>() {
+fn a_brake_that_is_too_weak_slips_by_the_difference<R: Float>() {
     let m = frictionless();
     let mut bench = Bench::<R>::new(m.clone());
     let mut actuators = braked::<R>();
@@ -134,7 +134,7 @@ fn a_brake_that_is_too_weak_slips_by_the_difference<R: Real>() {
 }
 
 /// 40 ms are 10 steps without effect, both ways.
-fn a_brake_acts_after_its_delay<R: Real>() {
+fn a_brake_acts_after_its_delay<R: Float>() {
     let mut bench = Bench::<R>::new(frictionless());
     let mut x = bench.x();
     (x.v[2], x.omega_uw) = (10.0, 10.0);
@@ -160,7 +160,7 @@ fn a_brake_acts_after_its_delay<R: Real>() {
 /// The web under run tension against the closed unwind brake, the drums held: after how many seconds it is lost.
 ///
 /// The roll comes to the brake with a speed inside the stiction band, as after every stop.
-fn time_to_lose_tension<R: Real>(karnopp_m_s: f64) -> Option<f64> {
+fn time_to_lose_tension<R: Float>(karnopp_m_s: f64) -> Option<f64> {
     let mut m = Machine::news_8000();
     m.brakes.karnopp_m_s = karnopp_m_s;
     let mut bench = Bench::<R>::new(m.clone());
@@ -181,14 +181,14 @@ fn time_to_lose_tension<R: Real>(karnopp_m_s: f64) -> Option<f64> {
 
 /// Figure 2 of the paper balances the forces in its band and leaves the speed: the roll creeps on, the web goes
 /// slack. The set-valued law takes the speed as well.
-fn the_papers_brake_creeps_and_the_set_valued_one_does_not<R: Real>() {
+fn the_papers_brake_creeps_and_the_set_valued_one_does_not<R: Float>() {
     let lost = time_to_lose_tension::<R>(0.05);
     assert!(lost.is_some_and(|time| time < 5.0), "{lost:?}");
     assert_eq!(time_to_lose_tension::<R>(0.0), None);
 }
 
 /// At rest a brake holds its static torque; once it slips, its sliding torque is left.
-fn a_standing_brake_holds_more_than_a_sliding_one<R: Real>() {
+fn a_standing_brake_holds_more_than_a_sliding_one<R: Float>() {
     let mut m = frictionless();
     m.brakes.static_ratio = 1.3;
     let (torque, inertia) = (m.brakes.uw_n_m, form::parent_inertia(&m, 1.5));

@@ -1,7 +1,7 @@
 //! Web break: by strength, by the end of the parent roll, and what is left of it.
 
 use model_core::machine::Machine;
-use model_core::real::Real;
+use model_core::real::Float;
 
 use crate::form::{self, Bench, H};
 use crate::in_both_scalars;
@@ -13,7 +13,7 @@ in_both_scalars!(
 );
 
 /// No tension, radii hold, rolls turn on; threading makes it whole again.
-fn is_broken<R: Real>(bench: &mut Bench<R>) {
+fn is_broken<R: Float>(bench: &mut Bench<R>) {
     let at = bench.winder.state();
     assert!(!bench.winder.threaded());
     for _ in 0..(5.0 / H) as u32 {
@@ -30,14 +30,14 @@ fn is_broken<R: Real>(bench: &mut Bench<R>) {
     assert!(bench.winder.threaded());
 }
 
-fn running<R: Real>(r_uw: f64) -> Bench<R> {
+fn running<R: Float>(r_uw: f64) -> Bench<R> {
     let m = Machine::news_8000();
     let x = form::steady(&m, 10.0, form::tension(&m), r_uw, 0.3);
     Bench::threaded(m, &x)
 }
 
 /// 2 kN/m·8 m = 16 kN in any span; below, it holds.
-fn the_web_breaks_above_its_strength<R: Real>() {
+fn the_web_breaks_above_its_strength<R: Float>() {
     let mut bench = running::<R>(1.5);
     let strength = bench.machine.web.strength_n_m * bench.machine.web.width_m;
     let mut highest = 0.0_f64;
@@ -56,7 +56,7 @@ fn the_web_breaks_above_its_strength<R: Real>() {
     is_broken(&mut bench);
 }
 
-fn the_web_parts_when_the_parent_roll_runs_out<R: Real>() {
+fn the_web_parts_when_the_parent_roll_runs_out<R: Float>() {
     let mut bench = running::<R>(0.4501);
     let expire = bench.machine.parent_roll.expire_radius_m;
     for _ in 0..100_000 {
@@ -71,7 +71,7 @@ fn the_web_parts_when_the_parent_roll_runs_out<R: Real>() {
     is_broken(&mut bench);
 }
 
-fn a_commanded_break_is_the_same<R: Real>() {
+fn a_commanded_break_is_the_same<R: Float>() {
     let mut bench = running::<R>(1.0);
     bench.winder.break_web();
     is_broken(&mut bench);

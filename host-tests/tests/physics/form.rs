@@ -8,7 +8,7 @@ use model_core::exchange::{Actuators, BySection};
 use model_core::machine::{DrivenRoll, Machine};
 use model_core::plant::Winder;
 use model_core::plant::rk4::State;
-use model_core::real::Real;
+use model_core::real::Float;
 
 /// The plant's step, s.
 pub const H: f64 = 0.004;
@@ -170,7 +170,7 @@ pub fn torques(m: &Machine, x: &State<f64, 3>, t_gr: f64, a: f64) -> BySection<f
 }
 
 /// What `f32` may be off by, or what `f64` may.
-pub fn either<R: Real>(single: f64, double: f64) -> f64 {
+pub fn either<R: Float>(single: f64, double: f64) -> f64 {
     if size_of::<R>() == size_of::<f32>() {
         single
     } else {
@@ -179,12 +179,12 @@ pub fn either<R: Real>(single: f64, double: f64) -> f64 {
 }
 
 /// A winder under test.
-pub struct Bench<R: Real> {
+pub struct Bench<R: Float> {
     pub machine: Machine,
     pub winder: Winder<R, 3>,
 }
 
-impl<R: Real> Bench<R> {
+impl<R: Float> Bench<R> {
     /// At standstill, not threaded, in steps of [`H`].
     pub fn new(machine: Machine) -> Self {
         Self::with_step(machine, H)
@@ -210,12 +210,12 @@ impl<R: Real> Bench<R> {
 
     /// The state as `f64`.
     pub fn x(&self) -> State<f64, 3> {
-        self.winder.state().map(Real::to_f64)
+        self.winder.state().map(R::to_f64)
     }
 
     /// The tensions as `f64`, N.
     pub fn t(&self) -> [f64; 3] {
-        self.winder.tension().map(Real::to_f64)
+        self.winder.tension().map(R::to_f64)
     }
 
     /// One step with torques.

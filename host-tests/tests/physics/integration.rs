@@ -3,7 +3,7 @@
 use model_core::exchange::BySection;
 use model_core::machine::Machine;
 use model_core::plant::rk4::State;
-use model_core::real::Real;
+use model_core::real::Float;
 use nalgebra::SVector;
 use ode_solvers::dop_shared::OutputType;
 use ode_solvers::dop853::Dop853;
@@ -56,7 +56,7 @@ const SCHEDULE: [(f64, [f64; 4]); 5] = [
 ];
 
 /// Both sides have slow oscillations, slack none: what is left is the step's own error, and f32's.
-fn an_independent_integrator_agrees<R: Real>() {
+fn an_independent_integrator_agrees<R: Float>() {
     let m = Machine::news_8000();
     let stall = m.operation.stall_share * form::tension(&m);
     let mut exact = form::steady(&m, 0.0, stall, m.parent_roll.full_radius_m, 0.05);

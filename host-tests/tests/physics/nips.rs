@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::machine::Machine;
 use model_core::plant::nip::Nips;
-use model_core::real::Real;
+use model_core::real::Float;
 use proptest::prelude::*;
 
 use crate::form::{self, Bench, H, either};
@@ -36,7 +36,7 @@ fn bare() -> Machine {
     m
 }
 
-fn turning<R: Real>(machine: Machine, v: f64, r_wu: f64) -> Bench<R> {
+fn turning<R: Float>(machine: Machine, v: f64, r_wu: f64) -> Bench<R> {
     let mut bench = Bench::new(machine);
     let mut x = bench.x();
     (x.v[2], x.windup, x.r_wu) = (v, [v; 3], r_wu);
@@ -44,7 +44,7 @@ fn turning<R: Real>(machine: Machine, v: f64, r_wu: f64) -> Bench<R> {
     bench
 }
 
-fn front<R: Real>(torque: f64) -> Actuators<R> {
+fn front<R: Float>(torque: f64) -> Actuators<R> {
     Actuators {
         torque: BySection {
             fd: R::of(torque),
@@ -92,7 +92,7 @@ fn the_rider_roll_holds_the_nip_load() {
 }
 
 /// All nips sticking is {15}: the same bits as the windup that cannot slip.
-fn without_slip_nothing_changes_when_slip_is_possible<R: Real>() {
+fn without_slip_nothing_changes_when_slip_is_possible<R: Float>() {
     let run = |machine: Machine| {
         let x = form::steady(&machine, 20.0, 2800.0, 1.4, 0.3);
         let mut bench = Bench::<R>::threaded(machine, &x);
@@ -116,7 +116,7 @@ fn without_slip_nothing_changes_when_slip_is_possible<R: Real>() {
 }
 
 /// The front drum's nip needs F = (T/R)·(M − m_fd)/M; it slides from μ·N·W on.
-fn a_drum_lets_go_at_the_traction_of_its_nip<R: Real>() {
+fn a_drum_lets_go_at_the_traction_of_its_nip<R: Float>() {
     let m = bare();
     let r = 0.3;
     let drum = m.front_drum;
@@ -145,7 +145,7 @@ fn a_drum_lets_go_at_the_traction_of_its_nip<R: Real>() {
 }
 
 /// m_fd·V̇_fd = T/R − μ·N·W, and the rest of the windup is driven by μ·N·W.
-fn a_sliding_drum_accelerates_by_what_its_nip_leaves<R: Real>() {
+fn a_sliding_drum_accelerates_by_what_its_nip_leaves<R: Float>() {
     let m = bare();
     let (r, torque, steps) = (0.3, 12e3, 250);
     let mut bench = turning::<R>(m.clone(), 5.0, r);
@@ -168,7 +168,7 @@ fn a_sliding_drum_accelerates_by_what_its_nip_leaves<R: Real>() {
 }
 
 /// After a kick the drum slides back into grip; Σ m·V is what the torque gave.
-fn a_roll_that_sticks_again_keeps_the_momentum<R: Real>() {
+fn a_roll_that_sticks_again_keeps_the_momentum<R: Float>() {
     let m = bare();
     let r = 0.5;
     let drum = m.front_drum;
@@ -193,7 +193,7 @@ fn a_roll_that_sticks_again_keeps_the_momentum<R: Real>() {
 }
 
 /// With static above sliding friction a nip holds more, and carries only sliding friction once it has let go.
-fn static_traction_is_lost_at_once<R: Real>() {
+fn static_traction_is_lost_at_once<R: Float>() {
     let mut m = bare();
     m.nips.static_ratio = 1.5;
     let r = 0.3;
@@ -222,7 +222,7 @@ fn static_traction_is_lost_at_once<R: Real>() {
 }
 
 /// R_wu² = R_core² + z_eff·L/π with z_eff = z·[1 − κ·(WOT/WOT_ref − 1)], and WOT as its terms say.
-fn tight_layers_are_thinner<R: Real>() {
+fn tight_layers_are_thinner<R: Float>() {
     let mut m = Machine::news_8000();
     m.wound_on_tension.compresses = true;
     m.wound_on_tension.hardness = 0.05;

@@ -2,8 +2,9 @@
 
 use model_core::exchange::BySection;
 use model_core::machine::Machine;
+use model_core::plant::units::Units;
 use model_core::plant::windup::Windup;
-use model_core::real::Real;
+use model_core::real::Float;
 
 use crate::form::{self, Bench, H, RUN};
 use crate::{in_both_scalars, near};
@@ -42,7 +43,7 @@ fn closed_forms_give_the_table() {
 }
 
 /// A whole set at run speed; the lengths are what the rolls' surfaces have covered.
-fn radii_follow_the_length<R: Real>() {
+fn radii_follow_the_length<R: Float>() {
     let m = Machine::news_8000();
     let t = form::tension(&m);
     let x = form::steady(&m, RUN, t, m.parent_roll.full_radius_m, 0.05);
@@ -71,9 +72,9 @@ fn radii_follow_the_length<R: Real>() {
 }
 
 /// M at the core and at 1.25 m, and as a step of the winder shows it: M = F·h/ΔV.
-fn mass_of_the_windup_is_that_of_its_rolls<R: Real>() {
+fn mass_of_the_windup_is_that_of_its_rolls<R: Float>() {
     let m = Machine::news_8000();
-    let windup = Windup::<R>::new(&m, H);
+    let windup = Windup::<R>::new(&m, &Units::SI, H);
     for (r, mass) in [(0.05, 15_061.0), (0.625, 18_459.0)] {
         let core = windup
             .mass(&windup.shipping_roll(R::of(r), R::ZERO))
@@ -97,7 +98,7 @@ fn mass_of_the_windup_is_that_of_its_rolls<R: Real>() {
 }
 
 /// No J̇·ω: the web carries the angular momentum away. With it, ω would grow by 17 % in this test.
-fn a_free_parent_roll_keeps_its_speed_while_its_radius_falls<R: Real>() {
+fn a_free_parent_roll_keeps_its_speed_while_its_radius_falls<R: Float>() {
     let mut m = Machine::news_8000();
     m.parent_roll.friction_n_s_m = 0.0;
     for roll in &mut m.idle {

@@ -82,7 +82,7 @@ fn numbers_round_trip() {
 }
 
 /// The same schedule, step by step; every tenth of a second.
-fn by_hand<R: model_core::real::Real>() -> Vec<Vec<f64>> {
+fn by_hand<R: model_core::real::Float>() -> Vec<Vec<f64>> {
     use model_core::exchange::{Actuators, Brakes, BySection};
     let mut bench = Bench::<R>::new(Machine::news_8000());
     bench.winder.thread_at(R::of(840.0));

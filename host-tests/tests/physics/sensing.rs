@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use model_core::exchange::{Actuators, BySection};
 use model_core::machine::{LoadCells, Machine};
-use model_core::real::Real;
+use model_core::real::Float;
 
 use crate::form::{self, Bench, H, RUN};
 use crate::{in_both_scalars, near};
@@ -18,7 +18,7 @@ in_both_scalars!(
 );
 
 /// The web at rest under one tension, the motors in balance with it.
-fn at_rest<R: Real>(m: &Machine, tension: f64) -> (Bench<R>, Actuators<R>) {
+fn at_rest<R: Float>(m: &Machine, tension: f64) -> (Bench<R>, Actuators<R>) {
     let mut bench = Bench::<R>::new(m.clone());
     bench.winder.thread_at(R::of(tension));
     let torque = BySection {
@@ -34,7 +34,7 @@ fn at_rest<R: Real>(m: &Machine, tension: f64) -> (Bench<R>, Actuators<R>) {
 }
 
 /// Indicated over true tension is sin(β/2)/sin(β_cal/2), and the zero adds tare/(2·sin(β_cal/2)).
-fn load_cells_show_what_their_wrap_angle_and_zero_make_of_the_tension<R: Real>() {
+fn load_cells_show_what_their_wrap_angle_and_zero_make_of_the_tension<R: Float>() {
     let tension = 2800.0;
     for (wrap, calibrated, tare, both_spans) in [
         (1.0, 1.0, 0.0, false),
@@ -60,7 +60,7 @@ fn load_cells_show_what_their_wrap_angle_and_zero_make_of_the_tension<R: Real>()
 }
 
 /// With cells that feel both spans, the friction of their roll shows by a half.
-fn load_cells_between_two_tensions_show_their_mean<R: Real>() {
+fn load_cells_between_two_tensions_show_their_mean<R: Float>() {
     let mut m = Machine::news_8000();
     m.load_cells.both_spans = true;
     let x = form::steady(&m, RUN, 2800.0, 1.5, 0.05);
@@ -79,7 +79,7 @@ fn load_cells_between_two_tensions_show_their_mean<R: Real>() {
 }
 
 /// A step of tension arrives as 1 − exp(−t/τ).
-fn load_cells_follow_through_their_filter<R: Real>() {
+fn load_cells_follow_through_their_filter<R: Float>() {
     let m = Machine::news_8000();
     let (mut bench, actuators) = at_rest::<R>(&m, 2800.0);
     for step in 1..50 {
@@ -102,7 +102,7 @@ fn heavy() -> Machine {
 }
 
 /// Ripple of t_uw and t_gr at ω in steady run, N: what is in phase with cos(ω·t + φ), and a quarter turn later.
-fn ripple<R: Real>(m: Machine, v: f64, omega: f64) -> [[f64; 2]; 2] {
+fn ripple<R: Float>(m: Machine, v: f64, omega: f64) -> [[f64; 2]; 2] {
     let x = form::steady(&m, v, 2800.0, 1.5, 0.05);
     let mut bench = Bench::<R>::threaded(m, &x);
     // whole turns, after the ripple has settled
@@ -129,7 +129,7 @@ fn amplitude([cosine, sine]: [f64; 2]) -> f64 {
 
 /// A deviation δ = ω·e·cos of the speed that enters a span strains it by (δ/V)/(1 + jω·L/V), and ω = V/R: the
 /// amplitude is EA·(e/R)/√(1 + (L/R)²).
-fn an_eccentric_parent_roll_pulls_once_a_turn<R: Real>() {
+fn an_eccentric_parent_roll_pulls_once_a_turn<R: Float>() {
     let (v, e) = (30.0, 1e-3);
     let mut m = heavy();
     m.parent_roll.eccentricity_m = e;
@@ -143,7 +143,7 @@ fn an_eccentric_parent_roll_pulls_once_a_turn<R: Real>() {
 }
 
 /// It lengthens the span before it by e as it shortens the one after it: EA·e/L on one side, −EA·e/L on the other.
-fn an_eccentric_idle_roll_gives_the_spans_beside_it_opposite_ripple<R: Real>() {
+fn an_eccentric_idle_roll_gives_the_spans_beside_it_opposite_ripple<R: Float>() {
     // slow enough that the step of 4 ms is short against a turn
     let (v, e) = (4.0, 1e-4);
     let mut m = heavy();

@@ -2,7 +2,8 @@
 
 use model_core::machine::Machine;
 use model_core::plant::span::Spans;
-use model_core::real::Real;
+use model_core::plant::units::Units;
+use model_core::real::Float;
 
 use crate::form::{self, Bench, H, RUN};
 use crate::{in_both_scalars, near};
@@ -15,8 +16,11 @@ in_both_scalars!(
     slack_does_not_push,
 );
 
+/// Rates are those for a sixth of a step: for a step of 6 s, those for a second.
+const SIX: f64 = 6.0;
+
 /// Strain of span `i` after `time` with all speeds held, by RK4 in steps of [`H`].
-fn follow<R: Real, const SPANS: usize>(
+fn follow<R: Float, const SPANS: usize>(
     spans: &Spans<R, SPANS>,
     v_in: f64,
     v: [f64; SPANS],
@@ -42,12 +46,18 @@ fn follow<R: Real, const SPANS: usize>(
     x
 }
 
-fn spans<R: Real>(m: &Machine) -> Spans<R, 3> {
-    Spans::new(form::lengths(m), form::stiffness(m), m.web.retardation_s)
+fn spans<R: Float>(m: &Machine) -> Spans<R, 3> {
+    Spans::new(
+        form::lengths(m),
+        form::stiffness(m),
+        m.web.retardation_s,
+        &Units::SI,
+        SIX,
+    )
 }
 
 /// With constant speeds 1/(1+ε) is an exact lag of L/V.
-fn a_span_lags_by_its_length_over_speed<R: Real>() {
+fn a_span_lags_by_its_length_over_speed<R: Float>() {
     let m = Machine::news_8000();
     for (i, lag) in [(0, 0.1636), (1, 0.0818), (2, 0.0682)] {
         near("L/V", form::lengths(&m)[i] / RUN, lag, 0.5e-4);
@@ -66,7 +76,7 @@ fn a_span_lags_by_its_length_over_speed<R: Real>() {
 }
 
 /// Δt = EA·(1+ε)·0.1 % = 2 083 N
-fn a_step_of_speed_changes_the_tension_by_its_stiffness<R: Real>() {
+fn a_step_of_speed_changes_the_tension_by_its_stiffness<R: Float>() {
     let m = Machine::news_8000();
     let x = form::steady(&m, RUN, form::tension(&m), 1.5, 0.05);
     let mut v = x.v;
@@ -88,8 +98,8 @@ fn a_step_of_speed_changes_the_tension_by_its_stiffness<R: Real>() {
 
 /// H. Koç et al., IEEE TCST 10 (2002) 179, figure 3: L = 1 m, ε_1 = 5 %, V 1 → 1.01 m/s. The form that is linear
 /// in the strain gives 0.0594 and 0.0405.
-fn strain_is_exact_at_large_strains<R: Real>() {
-    let spans = Spans::<R, 2>::new([1.0, 1.0], 1.0, 0.0);
+fn strain_is_exact_at_large_strains<R: Float>() {
+    let spans = Spans::<R, 2>::new([1.0, 1.0], 1.0, 0.0, &Units::SI, SIX);
     for (v, expected) in [([1.0, 1.01], 0.0605), ([1.01, 1.0], 0.0396)] {
         // the first span keeps its 5 %: V_1 = 1.05·V_in
         let v_in = v[0] / 1.05;
@@ -106,7 +116,7 @@ fn strain_is_exact_at_large_strains<R: Real>() {
 }
 
 /// t_gr − t_uw = c_gr·V = 229 N, t_sr − t_gr = c_sr·V = 264 N
-fn idle_rolls_take_their_friction_from_the_tension<R: Real>() {
+fn idle_rolls_take_their_friction_from_the_tension<R: Float>() {
     let m = Machine::news_8000();
     let x = form::steady(&m, RUN, form::tension(&m), 1.5, 0.05);
     let mut bench = Bench::<R>::threaded(m, &x);
@@ -121,7 +131,7 @@ fn idle_rolls_take_their_friction_from_the_tension<R: Real>() {
 }
 
 /// A loop in the web neither pulls nor pushes: idle rolls without friction keep their speed to the bit.
-fn slack_does_not_push<R: Real>() {
+fn slack_does_not_push<R: Float>() {
     let mut m = Machine::news_8000();
     for roll in &mut m.idle {
         roll.friction_n_s_m = 0.0;

@@ -97,6 +97,7 @@ impl<R: Real> Drive<R> {
                 ..command.brakes
             },
             handling: command.handling,
+            faults: command.faults,
         };
         (actuators, self.status(m, v, torque))
     }
@@ -104,7 +105,7 @@ impl<R: Real> Drive<R> {
     fn follow_references(&mut self, command: &DriveCommand<R>, v: R) {
         let (rate, jerk) = self.tension_rate;
         self.tension.step(command.tension, rate, jerk);
-        if !command.drums {
+        if !command.drums && command.unwind != UnwindControl::Speed {
             self.speed.set(v);
         } else if !command.freeze_ramp {
             self.speed

@@ -1,4 +1,6 @@
-//! Conditions that count only after they have lasted.
+//! Conditions that count only after they have lasted, and what a filter hides.
+
+use crate::real::Real;
 
 /// A condition that must hold for some cycles before it counts, and must be gone as long before it is over.
 #[derive(Clone, Copy, Debug, Default)]
@@ -44,5 +46,30 @@ impl Heartbeat {
             self.cycles = self.cycles.saturating_add(1);
         }
         self.cycles > limit
+    }
+}
+
+/// What a first-order filter is fed with, from what comes out of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Unfiltered<R> {
+    /// 1/(1 − exp(−T/τ))
+    lead: R,
+    last: R,
+}
+
+impl<R: Real> Unfiltered<R> {
+    /// For a filter of `tau` seconds, looked at every `period` seconds.
+    pub fn new(tau: f64, period: f64) -> Self {
+        Self {
+            lead: R::of(-1.0 / libm::expm1(-period / tau)),
+            last: R::ZERO,
+        }
+    }
+
+    /// One period: u = y₋ + (y − y₋)/(1 − exp(−T/τ)), exact for an input that is constant over the period.
+    pub fn step(&mut self, y: R) -> R {
+        let u = self.last + (y - self.last) * self.lead;
+        self.last = y;
+        u
     }
 }

@@ -15,12 +15,12 @@ impl<R: Real> Logic<R> {
         f.set_word(&image::HEARTBEAT, self.heartbeat);
         f.set_word(&image::MODE, self.mode as u16);
         f.set_word(&image::REFUSAL, self.refusal as u16);
-        f.set_word(&image::FAULT, self.fault as u16);
+        f.set_word(&image::FAULT, self.faults.first() as u16);
+        f.set_word(&image::WARNINGS, self.faults.warnings());
 
         let set = sight.commands.get::<R>(&image::V_SET) * R::of(1.0 / 60.0);
         let at_speed = self.mode == Mode::Run && d.v.is_near(set, c.speed_tolerance);
         f.set_word(&image::WINDER_STATUS, self.status(sight, at_speed));
-        let fault = self.fault == Fault::HeartbeatLost;
         let mut speed = 0;
         if d.v.is_near(d.v_ref, c.speed_tolerance) {
             speed |= zsw1::SPEED_WITHIN_TOLERANCE;
@@ -28,7 +28,10 @@ impl<R: Real> Logic<R> {
         if at_speed {
             speed |= zsw1::SETPOINT_REACHED;
         }
-        let zsw = self.sections.map(|s| s.status(fault, speed));
+        let faulty = self.faults.latched().sections();
+        let warned = self.faults.warned();
+        let told = self.sections.zip(faulty.zip(warned));
+        let zsw = told.map(|(s, (fault, warning))| s.status(fault, warning, speed));
         f.set_word(&image::ZSW1_UW, zsw.uw);
         f.set_word(&image::ZSW1_RD, zsw.rd);
         f.set_word(&image::ZSW1_FD, zsw.fd);
@@ -65,19 +68,19 @@ impl<R: Real> Logic<R> {
     }
 
     fn status(&self, sight: &Sight<R>, at_speed: bool) -> u16 {
-        let closed = sight.m.brakes;
+        let (closed, latched) = (sight.m.brakes, self.faults.latched());
         [
             (self.all_in_operation(), status::DRIVES_ON),
             (self.tension.is_on(), status::TENSION_DETECTED),
             (self.web_threaded, status::WEB_THREADED),
-            (self.fault == Fault::WebBreak, status::WEB_BREAK),
+            (latched.has(Fault::WebBreak), status::WEB_BREAK),
             (at_speed, status::AT_SPEED),
             (sight.standstill, status::ZERO_SPEED),
             (closed.uw, status::BRAKE_UW),
             (closed.rd, status::BRAKE_RD),
             (closed.fd, status::BRAKE_FD),
             (self.preset_taken, status::PRESET_TAKEN),
-            (self.fault != Fault::None, status::FAULT),
+            (!latched.is_empty(), status::FAULT),
             (self.refusal != Refusal::None, status::REFUSED),
         ]
         .into_iter()

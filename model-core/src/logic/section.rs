@@ -84,6 +84,23 @@ impl Section {
         };
     }
 
+    /// A fault of its own takes the section out at once.
+    pub fn trip(&mut self) {
+        self.state = State::SwitchingOnInhibited;
+    }
+
+    /// The direction of jogging, +1 by jog 1 and −1 by jog 2: only while the ramp generator and the set-point are
+    /// not enabled. None when both are set.
+    pub fn jog(&self) -> Option<i8> {
+        let normal = stw1::ENABLE_RAMP | stw1::UNFREEZE_RAMP | stw1::ENABLE_SETPOINT;
+        let has = |bit| self.word & bit != 0;
+        match (has(stw1::JOG_1), has(stw1::JOG_2)) {
+            _ if self.word & normal != 0 => Some(0),
+            (true, true) => None,
+            (forward, backward) => Some(i8::from(forward) - i8::from(backward)),
+        }
+    }
+
     /// Ends operation: after OFF1 the section is ready again, after anything else it is inhibited.
     pub fn switch_off(&mut self, fault: bool) {
         if self.state == State::Operation {
@@ -96,7 +113,7 @@ impl Section {
     }
 
     /// Status word 1. `speed` holds the bits that tell of the speed.
-    pub fn status(&self, fault: bool, speed: u16) -> u16 {
+    pub fn status(&self, fault: bool, warning: bool, speed: u16) -> u16 {
         let state = match self.state {
             State::SwitchingOnInhibited => zsw1::SWITCHING_ON_INHIBITED,
             State::ReadyToSwitchOn => zsw1::READY_TO_SWITCH_ON,
@@ -110,6 +127,7 @@ impl Section {
             | follow(stw1::NO_COAST, zsw1::NO_COAST)
             | follow(stw1::NO_QUICK_STOP, zsw1::NO_QUICK_STOP)
             | if fault { zsw1::FAULT } else { 0 }
+            | if warning { zsw1::WARNING } else { 0 }
             | zsw1::CONTROL_REQUESTED
             | speed
     }
@@ -161,6 +179,6 @@ mod tests {
         let mut section = Section::default();
         section.step(0x047e, true);
         assert_eq!(section.state(), State::SwitchingOnInhibited);
-        assert_eq!(section.status(true, 0) & zsw1::FAULT, zsw1::FAULT);
+        assert_eq!(section.status(true, false, 0) & zsw1::FAULT, zsw1::FAULT);
     }
 }

@@ -24,6 +24,16 @@ pub mod command {
     pub const NEW_PARENT_ROLL: u16 = 1 << 8;
     /// Rising edge: forget the worst task times and overruns.
     pub const RESET_TIMES: u16 = 1 << 9;
+    /// Unwind maneuver forward, as long as it stands.
+    pub const JOG_FORWARD: u16 = 1 << 10;
+    /// Unwind maneuver backward, as long as it stands.
+    pub const JOG_BACKWARD: u16 = 1 << 11;
+    /// The second diameter preset is the one to accept.
+    pub const PRESET_2: u16 = 1 << 12;
+    /// Auto-tune: a rising edge starts it, 0 ends it.
+    pub const AUTOTUNE: u16 = 1 << 13;
+    /// Rising edge: the operator has cut the web and taken it out.
+    pub const WEB_REMOVED: u16 = 1 << 14;
 }
 
 /// Bits of the winder's status word.
@@ -90,6 +100,31 @@ pub const COMMAND_BITS: &[Bit] = &[
         "reset_times",
         "rising edge forgets the worst task times and overruns",
     ),
+    Bit::new(
+        10,
+        "jog_forward",
+        "rising edge starts the unwind maneuver, forward; 0 ends it",
+    ),
+    Bit::new(
+        11,
+        "jog_backward",
+        "rising edge starts the unwind maneuver, backward; 0 ends it",
+    ),
+    Bit::new(
+        12,
+        "preset_2",
+        "preset_accept takes the second diameter preset",
+    ),
+    Bit::new(
+        13,
+        "autotune",
+        "rising edge starts the auto-tune of autotune_loop; 0 ends it",
+    ),
+    Bit::new(
+        14,
+        "web_removed",
+        "rising edge: the operator has cut the web and taken it out",
+    ),
 ];
 
 /// The bits of the status word by name.
@@ -129,7 +164,7 @@ macro_rules! codes {
             pub const NAMES: &[&str] = &[$first_text, $($text),*];
             /// Every code in order.
             pub const ALL: &[Self] = &[Self::$first, $(Self::$id),*];
-                /// The text of this code.
+            /// The text of this code.
             pub fn name(self) -> &'static str {
                 Self::NAMES[self as usize]
             }
@@ -149,6 +184,8 @@ codes! {
         EmergencyStop: "emergency stop",
         CoastStop: "coast stop",
         WebBreakStop: "web-break stop",
+        UnwindManeuver: "unwind maneuver",
+        AutoTune: "auto-tune",
     }
 }
 
@@ -164,6 +201,10 @@ codes! {
         NoPreset: "no diameter preset has been taken over",
         PresetOutOfRange: "the diameter preset is not between spool and full roll",
         WrongMode: "not permitted in this mode",
+        Contradictory: "contradictory commands: the safer one counts",
+        UnwindNotOn: "the unwind drive is not in operation",
+        WebInMachine: "the web is threaded: take it out first",
+        CauseStands: "the cause of a fault still stands",
     }
 }
 
@@ -173,5 +214,150 @@ codes! {
         None: "none",
         HeartbeatLost: "the PLC's heartbeat stands still",
         WebBreak: "web break",
+        EncoderUnwind: "no pulses from the unwind's encoder",
+        EncoderRearDrum: "no pulses from the rear drum's encoder",
+        TripUnwind: "the unwind's drive has tripped",
+        TripRearDrum: "the rear drum's drive has tripped",
+        TripFrontDrum: "the front drum's drive has tripped",
+        TripRiderRoll: "the rider roll's drive has tripped",
+        HotUnwind: "the unwind's motor is too hot",
+        HotRearDrum: "the rear drum's motor is too hot",
+        HotFrontDrum: "the front drum's motor is too hot",
+        HotRiderRoll: "the rider roll's motor is too hot",
+        BrakeUnwind: "the unwind's brake does not follow its command",
+        BrakeRearDrum: "the rear drum's brake does not follow its command",
+        BrakeFrontDrum: "the front drum's brake does not follow its command",
+        UnwindDeviates: "the unwind's speed does not fit the web's",
     }
 }
+
+/// Bits of the word of warnings.
+pub mod warning {
+    /// The unwind's motor is hot.
+    pub const HOT_UW: u16 = 1 << 0;
+    /// The rear drum's motor is hot.
+    pub const HOT_RD: u16 = 1 << 1;
+    /// The front drum's motor is hot.
+    pub const HOT_FD: u16 = 1 << 2;
+    /// The rider roll's motor is hot.
+    pub const HOT_RR: u16 = 1 << 3;
+    /// The load cells show tension and there is no web.
+    pub const LOAD_CELL_ZERO: u16 = 1 << 4;
+}
+
+/// The bits of the word of warnings by name.
+pub const WARNING_BITS: &[Bit] = &[
+    Bit::new(0, "hot_uw", "the unwind's motor is hot and will trip"),
+    Bit::new(1, "hot_rd", "the rear drum's motor is hot and will trip"),
+    Bit::new(2, "hot_fd", "the front drum's motor is hot and will trip"),
+    Bit::new(3, "hot_rr", "the rider roll's motor is hot and will trip"),
+    Bit::new(
+        4,
+        "load_cell_zero",
+        "the load cells show tension and there is no web",
+    ),
+];
+
+/// What a test puts in: bits of the simulator's own words.
+pub mod inject {
+    /// The unwind's brake does not close.
+    pub const BRAKE_UW_OPEN: u16 = 1 << 0;
+    /// The unwind's brake does not open.
+    pub const BRAKE_UW_CLOSED: u16 = 1 << 1;
+    /// The rear drum's brake does not close.
+    pub const BRAKE_RD_OPEN: u16 = 1 << 2;
+    /// The rear drum's brake does not open.
+    pub const BRAKE_RD_CLOSED: u16 = 1 << 3;
+    /// The front drum's brake does not close.
+    pub const BRAKE_FD_OPEN: u16 = 1 << 4;
+    /// The front drum's brake does not open.
+    pub const BRAKE_FD_CLOSED: u16 = 1 << 5;
+    /// The parent roll has run out of paper.
+    pub const PARENT_ROLL_EXPIRED: u16 = 1 << 6;
+
+    /// The unwind's encoder gives no pulses.
+    pub const ENCODER_UW: u16 = 1 << 0;
+    /// The rear drum's encoder gives no pulses.
+    pub const ENCODER_RD: u16 = 1 << 1;
+    /// The load cells show what they last showed.
+    pub const LOAD_CELL_STUCK: u16 = 1 << 2;
+
+    /// The unwind's drive has tripped.
+    pub const TRIP_UW: u16 = 1 << 0;
+    /// The rear drum's drive has tripped.
+    pub const TRIP_RD: u16 = 1 << 1;
+    /// The front drum's drive has tripped.
+    pub const TRIP_FD: u16 = 1 << 2;
+    /// The rider roll's drive has tripped.
+    pub const TRIP_RR: u16 = 1 << 3;
+    /// The unwind's motor is too warm.
+    pub const HOT_UW: u16 = 1 << 4;
+    /// The rear drum's motor is too warm.
+    pub const HOT_RD: u16 = 1 << 5;
+    /// The front drum's motor is too warm.
+    pub const HOT_FD: u16 = 1 << 6;
+    /// The rider roll's motor is too warm.
+    pub const HOT_RR: u16 = 1 << 7;
+    /// The diameter estimator has no interlocks.
+    pub const BARE_ESTIMATOR: u16 = 1 << 8;
+    /// The regulators do not compensate inertia.
+    pub const NO_INERTIA_COMPENSATION: u16 = 1 << 9;
+    /// Nothing passes between PLC and drives.
+    pub const BUS_SILENT: u16 = 1 << 10;
+}
+
+/// The bits of the word of machine faults by name.
+pub const MACHINE_FAULT_BITS: &[Bit] = &[
+    Bit::new(0, "brake_uw_open", "the unwind's brake does not close"),
+    Bit::new(1, "brake_uw_closed", "the unwind's brake does not open"),
+    Bit::new(2, "brake_rd_open", "the rear drum's brake does not close"),
+    Bit::new(3, "brake_rd_closed", "the rear drum's brake does not open"),
+    Bit::new(4, "brake_fd_open", "the front drum's brake does not close"),
+    Bit::new(5, "brake_fd_closed", "the front drum's brake does not open"),
+    Bit::new(
+        6,
+        "parent_roll_expired",
+        "the parent roll has run down to its expire radius",
+    ),
+];
+
+/// The bits of the word of sensor faults by name.
+pub const SENSOR_FAULT_BITS: &[Bit] = &[
+    Bit::new(0, "encoder_uw", "the unwind's encoder gives no pulses"),
+    Bit::new(1, "encoder_rd", "the rear drum's encoder gives no pulses"),
+    Bit::new(
+        2,
+        "load_cell_stuck",
+        "the load cells show what they last showed",
+    ),
+];
+
+/// The bits of the word of drive faults by name.
+pub const DRIVE_FAULT_BITS: &[Bit] = &[
+    Bit::new(0, "trip_uw", "the unwind's drive trips"),
+    Bit::new(1, "trip_rd", "the rear drum's drive trips"),
+    Bit::new(2, "trip_fd", "the front drum's drive trips"),
+    Bit::new(3, "trip_rr", "the rider roll's drive trips"),
+    Bit::new(4, "hot_uw", "the unwind's motor is too warm"),
+    Bit::new(5, "hot_rd", "the rear drum's motor is too warm"),
+    Bit::new(6, "hot_fd", "the front drum's motor is too warm"),
+    Bit::new(7, "hot_rr", "the rider roll's motor is too warm"),
+    Bit::new(
+        8,
+        "bare_estimator",
+        "the diameter estimator has no interlocks",
+    ),
+    Bit::new(
+        9,
+        "no_inertia_compensation",
+        "the regulators do not compensate inertia",
+    ),
+    Bit::new(
+        10,
+        "bus_silent",
+        "nothing passes between the PLC and the drives",
+    ),
+];
+
+/// The loops that auto-tune knows, by their code.
+pub const LOOPS: &[&str] = &["drum speed", "unwind speed", "tension"];

@@ -284,6 +284,14 @@ impl Machine {
         roll.spool_inertia_kg_m2 - self.web.roll_inertia(roll.spool_radius_m)
     }
 
+    /// Mass of the windup at its surface with a shipping roll of this radius, {15}, kg.
+    pub fn windup_mass_kg(&self, r_wu: f64) -> f64 {
+        let rolls = [&self.rear_drum, &self.front_drum, &self.rider_roll];
+        let core = self.shipping_roll.core_radius_m;
+        let roll = self.web.roll_inertia(r_wu) - self.web.roll_inertia(core);
+        rolls.iter().map(|roll| roll.mass_kg()).sum::<f64>() + roll / (r_wu * r_wu)
+    }
+
     /// Length of the web from the unwind to the rear drum, m.
     pub fn web_path_m(&self) -> f64 {
         self.idle.iter().map(|roll| roll.span_m).sum::<f64>() + self.last_span_m

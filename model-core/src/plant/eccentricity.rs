@@ -7,7 +7,7 @@
 
 use super::rk4::State;
 use crate::machine::Machine;
-use crate::real::Real;
+use crate::real::{Arithmetic, Real};
 
 /// Phase from roll to roll, rad: the golden angle, so that no two rolls agree.
 const PHASE: f64 = 2.399_963_229_728_653;
@@ -21,16 +21,20 @@ pub struct Offsets<R, const SPANS: usize> {
     pub rolls: [R; SPANS],
 }
 
-impl<R: Real, const SPANS: usize> Offsets<R, SPANS> {
-    /// Round rolls.
-    pub const NONE: Self = Self {
-        uw: R::ZERO,
-        rolls: [R::ZERO; SPANS],
-    };
+impl<T: Copy, const SPANS: usize> Offsets<T, SPANS> {
+    /// The same in other numbers.
+    pub fn map<U>(&self, mut f: impl FnMut(T) -> U) -> Offsets<U, SPANS> {
+        Offsets {
+            uw: f(self.uw),
+            rolls: self.rolls.map(f),
+        }
+    }
+}
 
+impl<A: Arithmetic, const SPANS: usize> Offsets<A, SPANS> {
     /// Speeds with their deviations.
     #[inline(always)]
-    pub fn added_to(&self, v: &[R; SPANS]) -> [R; SPANS] {
+    pub fn added_to(&self, v: &[A; SPANS]) -> [A; SPANS] {
         core::array::from_fn(|i| v[i] + self.rolls[i])
     }
 }
@@ -38,9 +42,13 @@ impl<R: Real, const SPANS: usize> Offsets<R, SPANS> {
 /// The eccentric rolls and how far they have turned.
 #[derive(Clone, Debug)]
 pub struct Eccentricity<R, const SPANS: usize> {
+    /// The machine's own rolls are eccentric.
+    own: bool,
     present: bool,
     period: R,
     uw: Roll<R>,
+    /// The parent roll's own eccentricity, m.
+    uw_own: R,
     rolls: [Roll<R>; SPANS],
     /// 1/R of the roll at the end of each span, 1/m; zero where it is round.
     per_radius: [R; SPANS],
@@ -80,10 +88,13 @@ impl<R: Real, const SPANS: usize> Eccentricity<R, SPANS> {
         };
         let idle = |i: usize| machine.idle.get(i);
         let parent = machine.parent_roll.eccentricity_m;
+        let own = parent > 0.0 || machine.idle.iter().any(|roll| roll.eccentricity_m > 0.0);
         Self {
-            present: parent > 0.0 || machine.idle.iter().any(|roll| roll.eccentricity_m > 0.0),
+            own,
+            present: own,
             period: R::of(h),
             uw: roll(0, parent),
+            uw_own: R::of(parent),
             rolls: core::array::from_fn(|i| roll(i + 1, idle(i).map_or(0.0, |r| r.eccentricity_m))),
             per_radius: core::array::from_fn(|i| {
                 idle(i).map_or(R::ZERO, |r| R::of(1.0 / r.radius_m))
@@ -96,11 +107,14 @@ impl<R: Real, const SPANS: usize> Eccentricity<R, SPANS> {
         self.present
     }
 
+    /// A parent roll that is eccentric by `more`, m, beside the machine's own.
+    pub fn add_to_parent_roll(&mut self, more: R) {
+        self.present = self.own || more > R::ZERO;
+        self.uw.eccentricity = self.uw_own + more;
+    }
+
     /// The deviations of the step that starts at `x`.
     pub fn turn(&mut self, x: &State<R, SPANS>) -> Offsets<R, SPANS> {
-        if !self.present {
-            return Offsets::NONE;
-        }
         Offsets {
             uw: self.uw.turn(x.omega_uw, self.period),
             rolls: core::array::from_fn(|i| {

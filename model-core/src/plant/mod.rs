@@ -6,27 +6,32 @@
 //! positive for speeds and motor torques; a span pulls the roll before it forward and holds the roll after it
 //! back. A span is named after the roll it leaves.
 
+pub mod contact;
 pub mod eccentricity;
 pub mod friction;
 pub mod modes;
+pub mod motion;
 pub mod nip;
 pub mod rk4;
 pub mod roll;
 pub mod sensors;
 pub mod span;
+pub mod units;
 pub mod windup;
 
-use crate::exchange::{Actuators, Brakes, BySection, Measurements};
+use crate::exchange::{Actuators, Brakes, BySection, MachineFaults, Measurements, SensorFaults};
 use crate::machine::{Machine, MachineError};
-use crate::real::{Real, Sum};
+use crate::real::{Accumulator, Real, Ring, Scalar};
+use contact::{Contact, Holding, ParentRoll, Traction};
 use eccentricity::{Eccentricity, Offsets};
 use friction::{Brake, Delay, Friction, Law};
+use motion::{Load, Motion};
 use nip::Nips;
-use rk4::{Rk4, State};
-use roll::{Idle, Unwind};
+use rk4::State;
 use sensors::{Sensors, Sight};
-use span::{Spans, Web};
-use windup::{FRONT, Holding, Nip, Parts, ROLLS, Speeds, Traction, Windup};
+use span::Web;
+use units::Units;
+use windup::{FRONT, Nip, Parts, ROLLS, Speeds, Whole};
 
 /// Period of the plant task and longest step of its integration, ms.
 pub const PLANT_PERIOD_MS: u32 = 4;
@@ -39,20 +44,25 @@ const BARE: f64 = 0.99;
 
 /// The winder with its web, advanced by fixed steps.
 #[derive(Clone, Debug)]
-pub struct Winder<R: Real, const SPANS: usize> {
-    coefficients: Coefficients<R, SPANS>,
+pub struct Winder<R: Scalar, const SPANS: usize> {
+    motion: Motion<R, SPANS>,
+    holders: Holders<R::Si>,
+    limits: Limits<R>,
+    scale: Scale<R>,
     substeps: u32,
-    state: State<R::Sum, SPANS>,
+    state: State<R::Sum, SPANS, 0>,
+    /// Speeds of front drum, rider roll and shipping roll, where the windup may slip.
+    apart: [R::Sum; ROLLS],
     /// Strain rates and tensions that belong to the state.
     web: Web<R, SPANS>,
     /// The web is led through the machine and whole.
     threaded: bool,
     delay: Brakes<Delay>,
     closed: Brakes<bool>,
-    nips: [Nip<R>; ROLLS],
-    winding: Winding<R>,
-    eccentricity: Eccentricity<R, SPANS>,
-    sensors: Sensors<R>,
+    nips: [Nip<R::Si>; ROLLS],
+    winding: Winding<R::Si>,
+    eccentricity: Eccentricity<R::Si, SPANS>,
+    sensors: Sensors<R::Si>,
 }
 
 /// How the shipping roll is being wound: ground truth. Known only where slip or layers that compress are computed.
@@ -70,24 +80,27 @@ pub struct Winding<R> {
     pub burst: bool,
 }
 
+/// What holds the rolls: brakes and nips.
 #[derive(Clone, Debug)]
-struct Coefficients<R, const SPANS: usize> {
-    spans: Spans<R, SPANS>,
-    /// The roll at the end of each span but the last, where the windup is.
-    idle: [Option<Idle<R>>; SPANS],
-    unwind: Unwind<R>,
-    windup: Windup<R>,
+struct Holders<R> {
+    parent: ParentRoll<R>,
+    contact: Contact<R>,
     nips: Nips<R>,
     /// The rolls of the windup may slip.
     slips: bool,
-    rk4: Rk4<R>,
     /// Brakes as they are when closed: a torque on the unwind, forces at the drums' surfaces.
     brakes: Brakes<Brake<R>>,
     /// Half width of the stiction band at the surface, m/s, where the paper's brake model is wanted.
     karnopp: Option<R>,
-    /// Tension at which the web breaks, N, and per width, N/m.
+    /// Wound-on tension at which the shipping roll bursts, N/m.
     strength: R,
-    strength_per_width: R,
+}
+
+/// Where the web begins and ends.
+#[derive(Clone, Copy, Debug)]
+struct Limits<R> {
+    /// Tension at which the web breaks.
+    strength: R,
     core_radius: R,
     /// A shipping roll as thin as this has lost its web: the machine has run backwards.
     bare_radius: R,
@@ -96,24 +109,26 @@ struct Coefficients<R, const SPANS: usize> {
     threaded_strain: R,
 }
 
-/// What drives the winder, constant over a step.
-#[derive(Clone, Copy)]
-struct Load<R> {
-    /// Torque on the parent roll less its brake's, N·m.
-    uw: R,
-    /// On the windup.
-    windup: windup::Load<R>,
-    /// Speed of the layer that is wound, of the web's: z_eff/z; zero without web.
-    layer: R,
-    threaded: bool,
+/// The units in which the state is counted.
+#[derive(Clone, Copy, Debug)]
+struct Scale<R: Scalar> {
+    speed: R::Unit,
+    strain: R::Unit,
+    force: R::Unit,
+    torque: R::Unit,
+    omega: R::Unit,
+    r_uw: R::Unit,
+    r_wu: R::Unit,
+    travel: R::Unit,
+    one: R::Unit,
 }
 
-impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
+impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     /// The winder of a machine with `SPANS` spans, in steps of `h` seconds: at standstill, web not threaded,
     /// full parent roll, bare core, brakes off.
     ///
-    /// Fails with the first parameter that is outside its limits, or when the machine has another number of
-    /// spans.
+    /// Fails with the first parameter that is outside its limits, when the machine has another number of spans, or
+    /// when its coefficients are beyond the range of the numbers.
     pub fn new(machine: &Machine, h: f64) -> Result<Self, MachineError> {
         machine.validate()?;
         if machine.idle.len() + 1 != SPANS {
@@ -127,48 +142,55 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         }
         let substeps = modes::substeps(machine, h);
         let step = h / f64::from(substeps);
-        let coefficients = Coefficients::new(machine, step);
+        let units = Units::of::<R>(machine, h);
+        units.fit::<R>(machine, step)?;
+        let limits = Limits::new(machine, &units);
         let zero = R::Sum::at(R::ZERO);
         Ok(Self {
+            motion: Motion::new(machine, &units, step),
+            holders: Holders::new(machine, step),
+            scale: Scale::new(&units),
             substeps,
             state: State {
                 strain: [zero; SPANS],
                 v: [zero; SPANS],
-                windup: [zero; 3],
+                windup: [],
                 omega_uw: zero,
-                r_uw: R::Sum::at(coefficients.full_radius),
-                r_wu: R::Sum::at(coefficients.core_radius),
+                r_uw: R::Sum::at(limits.full_radius),
+                r_wu: R::Sum::at(limits.core_radius),
                 travel: zero,
             },
-            web: Web::NONE,
+            limits,
+            apart: [zero; ROLLS],
+            web: Web::none(),
             threaded: false,
             delay: Brakes::all(Delay::new(machine.brakes.delay_s, h)),
             closed: Brakes::default(),
             nips: [Nip::Sticks; ROLLS],
             winding: Winding {
-                wound_on_tension: R::of(machine.wound_on_tension.reference_n_m),
+                wound_on_tension: R::Si::of(machine.wound_on_tension.reference_n_m),
                 ..Winding::default()
             },
             eccentricity: Eccentricity::new(machine, step),
             sensors: Sensors::new(machine, h),
-            coefficients,
         })
     }
 
     /// One step of h: what people do, the brakes, the motion, the web's strength, the sensors.
-    pub fn step(&mut self, actuators: &Actuators<R>) -> Measurements<R> {
+    pub fn step(&mut self, actuators: &Actuators<R::Si>) -> Measurements<R::Si> {
         self.handle(actuators);
+        let (brakes, stuck) = (actuators.brakes, actuators.faults.machine.brakes);
         self.closed = Brakes {
-            uw: self.delay.uw.step(actuators.brakes.uw),
-            rd: self.delay.rd.step(actuators.brakes.rd),
-            fd: self.delay.fd.step(actuators.brakes.fd),
+            uw: stuck.uw.acts_on(self.delay.uw.step(brakes.uw)),
+            rd: stuck.rd.acts_on(self.delay.rd.step(brakes.rd)),
+            fd: stuck.fd.acts_on(self.delay.fd.step(brakes.fd)),
         };
         self.state.travel = R::Sum::at(R::ZERO);
         for _ in 0..self.substeps {
             self.advance(actuators);
             self.break_web_if_due();
         }
-        self.measure()
+        self.measure(&actuators.faults.sensors)
     }
 
     /// Steps of integration in one step of the winder: more than one where light rolls or short spans make a
@@ -178,44 +200,68 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
     }
 
     /// Puts the web under the same tension in all spans, in N, the machine as it stands.
-    pub fn thread_at(&mut self, tension: R) {
-        self.thread_with(self.coefficients.spans.strain_of(tension));
+    pub fn thread_at(&mut self, tension: R::Si) {
+        let tension = R::of_si(tension, self.scale.force);
+        self.thread_with(self.motion.spans.strain_of(tension));
     }
 
     /// The web parts: all tensions go to zero and stay there until it is threaded again.
     pub fn break_web(&mut self) {
         self.threaded = false;
         self.state.strain = [R::Sum::at(R::ZERO); SPANS];
-        self.web = Web::NONE;
+        self.web = Web::none();
     }
 
-    /// The state variables: ground truth, for records and tests.
-    pub fn state(&self) -> State<R, SPANS> {
-        self.state.map(|sum| sum.value())
+    /// The state variables in SI: ground truth, for records and tests.
+    pub fn state(&self) -> State<R::Si, SPANS> {
+        let (x, scale) = (self.values(), &self.scale);
+        State {
+            strain: x.strain.map(|strain| strain.to_si(scale.strain)),
+            v: x.v.map(|v| v.to_si(scale.speed)),
+            windup: x.windup.map(|v| v.to_si(scale.speed)),
+            omega_uw: x.omega_uw.to_si(scale.omega),
+            r_uw: x.r_uw.to_si(scale.r_uw),
+            r_wu: x.r_wu.to_si(scale.r_wu),
+            travel: x.travel.to_si(scale.travel),
+        }
     }
 
-    /// Puts the machine into a state; the web stays threaded or not. Where the windup cannot slip, all of it
+    /// Bits of every state variable, in a fixed order: equal trajectories have equal ones.
+    pub fn fingerprints(&self) -> impl Iterator<Item = u32> {
+        self.values().iter().map(R::fingerprint)
+    }
+
+    /// Puts the machine into a state, in SI; the web stays threaded or not. Where the windup cannot slip, all of it
     /// takes the speed of the rear drum.
-    pub fn set_state(&mut self, state: &State<R, SPANS>) {
-        self.state = state.map(R::Sum::at);
-        if self.coefficients.slips {
+    pub fn set_state(&mut self, state: &State<R::Si, SPANS>) {
+        let scale = self.scale;
+        let at = |x, unit| R::Sum::at(R::of_si(x, unit));
+        self.state = State {
+            strain: state.strain.map(|strain| at(strain, scale.strain)),
+            v: state.v.map(|v| at(v, scale.speed)),
+            windup: [],
+            omega_uw: at(state.omega_uw, scale.omega),
+            r_uw: at(state.r_uw, scale.r_uw),
+            r_wu: at(state.r_wu, scale.r_wu),
+            travel: at(state.travel, scale.travel),
+        };
+        if self.holders.slips {
             let v = state.speeds();
+            self.apart = state.windup.map(|v| at(v, scale.speed));
             self.nips = v.rolls.map(|roll| Nip::between(roll, v.wu));
-        } else {
-            self.state.windup = [self.state.v[SPANS - 1]; 3];
         }
         if self.threaded {
-            self.web = self.coefficients.web(state, &Offsets::NONE);
+            self.look_at_web(&None);
         }
     }
 
     /// Tensions of the spans, N: ground truth.
-    pub fn tension(&self) -> [R; SPANS] {
-        self.web.tension
+    pub fn tension(&self) -> [R::Si; SPANS] {
+        self.web.tension.map(|t| t.to_si(self.scale.force))
     }
 
     /// How the shipping roll is being wound: ground truth. Known only where slip or layers that compress are computed.
-    pub fn winding(&self) -> &Winding<R> {
+    pub fn winding(&self) -> &Winding<R::Si> {
         &self.winding
     }
 
@@ -224,205 +270,280 @@ impl<R: Real, const SPANS: usize> Winder<R, SPANS> {
         self.threaded
     }
 
-    fn handle(&mut self, actuators: &Actuators<R>) {
-        let (c, handling) = (&self.coefficients, actuators.handling);
+    fn handle(&mut self, actuators: &Actuators<R::Si>) {
+        let (limits, handling) = (&self.limits, actuators.handling);
         if handling.new_core {
-            self.state.r_wu = R::Sum::at(c.core_radius);
+            self.state.r_wu = R::Sum::at(limits.core_radius);
             self.winding.burst = false;
         }
         if handling.new_parent_roll {
-            self.state.r_uw = R::Sum::at(c.full_radius);
+            self.state.r_uw = R::Sum::at(limits.full_radius);
+        }
+        let strain = limits.threaded_strain;
+        if handling.remove_web {
+            self.break_web();
         }
         if handling.thread_web && !self.threaded {
-            self.thread_with(c.threaded_strain);
+            self.thread_with(strain);
         }
+        self.suffer(&actuators.faults.machine);
+    }
+
+    /// The faults that a test puts into the machine.
+    fn suffer(&mut self, faults: &MachineFaults<R::Si>) {
+        if faults.parent_roll_expired {
+            self.state.r_uw = R::Sum::at(self.limits.expire_radius);
+        }
+        if faults.web_break > 0 && self.threaded {
+            self.break_web();
+        }
+        // drums once worn may slip from then on; a nip that sticks computes what a whole windup does
+        if self.holders.nips.wear(faults.drum_wear) && !self.holders.slips {
+            self.holders.slips = true;
+            self.apart = [self.state.v[SPANS - 1]; ROLLS];
+        }
+        self.eccentricity.add_to_parent_roll(faults.eccentricity);
     }
 
     fn thread_with(&mut self, strain: R) {
         self.threaded = true;
         self.state.strain = [R::Sum::at(strain); SPANS];
-        self.web = self.coefficients.web(&self.state(), &Offsets::NONE);
+        self.look_at_web(&None);
+    }
+
+    fn look_at_web(&mut self, offsets: &Option<Offsets<R, SPANS>>) {
+        let x = self.state.map(|sum| sum.value());
+        self.web = self.motion.web(&x, offsets);
+    }
+
+    /// The state variables, all speeds of the windup among them.
+    fn values(&self) -> State<R, SPANS> {
+        let x = self.state.map(|sum| sum.value());
+        x.with_apart(if self.holders.slips {
+            self.apart.map(|sum| sum.value())
+        } else {
+            [x.v[SPANS - 1]; ROLLS]
+        })
     }
 
     /// Moves everything by a step of integration, the friction of brakes and nips as it found it.
-    fn advance(&mut self, actuators: &Actuators<R>) {
-        let x = self.state.map(|sum| sum.value());
-        let offsets = self.eccentricity.turn(&x);
-        if self.threaded && self.eccentricity.present() {
-            self.web = self.coefficients.web(&x, &offsets);
+    fn advance(&mut self, actuators: &Actuators<R::Si>) {
+        let before = self.state.map(|sum| sum.value());
+        let offsets = self.turn_eccentric_rolls();
+        if self.threaded && offsets.is_some() {
+            self.web = self.motion.web(&before, &offsets);
         }
-        let traction = self.load_nips(x.r_wu);
-        let c = &self.coefficients;
-        let layer = if self.threaded {
-            c.nips.thickness(self.winding.wound_on_tension)
-        } else {
+        let layer = if !self.threaded {
             R::ZERO
+        } else if self.holders.nips.compress() {
+            let thickness = self.holders.nips.thickness(self.winding.wound_on_tension);
+            R::of_si(thickness, self.scale.one)
+        } else {
+            R::ONE
         };
-        let unwind = self.hold_unwind(actuators.torque.uw, &x);
-        let mut windup = self.hold_windup(&actuators.torque, &x, layer, traction.as_ref());
+        let unwind = self.hold_unwind(actuators.torque.uw);
+        let torque = actuators.torque.uw - unwind.lambda;
         let load = Load {
-            uw: actuators.torque.uw - unwind.lambda,
-            windup: windup.parts.load(),
+            uw: R::of_si(torque, self.scale.torque),
+            windup: (),
             layer,
             threaded: self.threaded,
+            offsets,
         };
-
-        let k1 = c.rates(&x, &self.web, &load);
-        c.rk4.step(&mut self.state, k1, |x| {
-            let web = if load.threaded {
-                c.web(x, &offsets)
-            } else {
-                Web::NONE
-            };
-            c.rates(x, &web, &load)
-        });
-
+        if self.holders.winds() || self.closed.rd || self.closed.fd {
+            self.turn_held_windup(&actuators.torque, &load);
+        } else {
+            let drive = self.holders.contact.drive(&actuators.torque);
+            self.turn_windup(&drive, &load);
+        }
         if unwind.sticks {
             self.state.omega_uw = R::Sum::at(R::ZERO);
         }
-        if !windup.goes_on() {
-            self.settle_windup(&x, &mut windup);
-        }
-        self.stop_wreck(&x);
+        self.stop_wreck(&before);
         if self.threaded {
-            self.web = self.coefficients.web(&self.state(), &offsets);
+            self.look_at_web(&load.offsets);
         }
-        if self.coefficients.winds() {
-            self.look_at_winding(&windup);
+    }
+
+    /// The deviations of eccentric rolls in the step that begins.
+    fn turn_eccentric_rolls(&mut self) -> Option<Offsets<R, SPANS>> {
+        if !self.eccentricity.present() {
+            return None;
+        }
+        let x = self.state();
+        let offsets = self.eccentricity.turn(&x);
+        Some(offsets.map(|v| R::of_si(v, self.scale.speed)))
+    }
+
+    /// Moves everything, the windup as one body.
+    fn turn_windup(&mut self, drive: &[R::Si; ROLLS], load: &Load<R, (), SPANS>) {
+        let [rd, fd, rr] = *drive;
+        let whole = Whole(R::of_si(rd + fd + rr, self.scale.force));
+        self.motion
+            .advance(&mut self.state, &self.web, &load.on(whole));
+    }
+
+    /// Moves everything, the windup with its brakes and nips.
+    fn turn_held_windup(&mut self, torque: &BySection<R::Si>, load: &Load<R, (), SPANS>) {
+        let x = self.state();
+        let traction = self.load_nips(x.r_wu);
+        let layer = load.layer.to_si(self.scale.one);
+        let mut holding = self.hold_windup(torque, &x, layer, traction.as_ref());
+        let parts = &holding.parts;
+        if parts.nips.iter().all(|nip| *nip == Nip::Sticks) {
+            self.turn_windup(&parts.drive, load);
+            self.apart = [self.state.v[SPANS - 1]; ROLLS];
+        } else {
+            let parts = parts.map(|force| R::of_si(force, self.scale.force));
+            let mut sums = self.state.with_apart(self.apart);
+            self.motion.advance(&mut sums, &self.web, &load.on(parts));
+            (self.state, self.apart) = (sums.with_apart([]), sums.windup);
+        }
+        if !holding.goes_on() {
+            self.settle_windup(x.r_wu, &mut holding);
+        }
+        if self.holders.winds() {
+            self.look_at_winding(&holding);
         }
     }
 
     /// What the nips can carry in this step, where they may let go.
-    fn load_nips(&mut self, r_wu: R) -> Option<Traction<R>> {
-        let c = &self.coefficients;
-        if c.winds() {
-            self.winding.nip_load = c.nips.loads(r_wu);
+    fn load_nips(&mut self, r_wu: R::Si) -> Option<Traction<R::Si>> {
+        let holders = &self.holders;
+        if holders.winds() {
+            self.winding.nip_load = holders.nips.loads(r_wu);
         }
-        if !c.slips {
+        if !holders.slips {
             return None;
         }
         Some(Traction {
-            sticking: c.nips.static_traction(&self.winding.nip_load),
-            sliding: c.nips.traction(&self.winding.nip_load),
+            sticking: holders.nips.static_traction(&self.winding.nip_load),
+            sliding: holders.nips.traction(&self.winding.nip_load),
         })
     }
 
-    /// How the brake of the unwind holds over the step that starts at `x`.
-    fn hold_unwind(&self, torque: R, x: &State<R, SPANS>) -> Friction<R> {
-        let c = &self.coefficients;
+    /// How the brake of the unwind holds over the step that begins.
+    fn hold_unwind(&self, torque: R::Si) -> Friction<R::Si> {
         if !self.closed.uw {
             return Friction::NONE;
         }
-        let v = x.omega_uw * x.r_uw;
-        let free = c.unwind.torque(torque, self.web.tension[0], v, x.r_uw);
-        let brake = c.brake_uw(x.r_uw);
-        brake.hold(c.unwind.inertia(x.r_uw), x.omega_uw, free)
+        let scale = &self.scale;
+        let t_uw = self.web.tension[0].to_si(scale.force);
+        let omega = self.state.omega_uw.value().to_si(scale.omega);
+        let r = self.state.r_uw.value().to_si(scale.r_uw);
+        let brake = self.holders.brake_uw(r);
+        self.holders.parent.hold(&brake, torque, t_uw, omega, r)
     }
 
     /// How nips and brakes of the windup hold over the step that starts at `x`.
     fn hold_windup(
         &self,
-        torque: &BySection<R>,
-        x: &State<R, SPANS>,
-        layer: R,
-        traction: Option<&Traction<R>>,
-    ) -> Holding<R> {
-        let c = &self.coefficients;
-        let drive = c.windup.drive(torque);
-        if !(c.winds() || self.closed.rd || self.closed.fd) {
-            return Holding::free(drive);
-        }
+        torque: &BySection<R::Si>,
+        x: &State<R::Si, SPANS>,
+        layer: R::Si,
+        traction: Option<&Traction<R::Si>>,
+    ) -> Holding<R::Si> {
+        let Holders {
+            contact, brakes, ..
+        } = &self.holders;
         let parts = Parts {
-            drive,
+            drive: contact.drive(torque),
             nips: self.nips,
         };
         let brakes = [
-            c.brakes.rd.when(self.closed.rd),
-            c.brakes.fd.when(self.closed.fd),
+            brakes.rd.when(self.closed.rd),
+            brakes.fd.when(self.closed.fd),
             Brake::NONE,
         ];
-        let roll = c.windup.shipping_roll(x.r_wu, x.v[SPANS - 1] * layer);
-        let t_sr = self.web.tension[SPANS - 1];
-        c.windup
-            .hold(&x.speeds(), &roll, t_sr, parts, &brakes, traction)
+        let roll = contact.shipping_roll(x.r_wu, x.v[SPANS - 1] * layer);
+        let t_sr = self.web.tension[SPANS - 1].to_si(self.scale.force);
+        contact.hold(&x.speeds(), &roll, t_sr, parts, &brakes, traction)
     }
 
-    fn settle_windup(&mut self, x: &State<R, SPANS>, holding: &mut Holding<R>) {
-        let c = &self.coefficients;
-        let roll = c.windup.shipping_roll(x.r_wu, R::ZERO);
+    fn settle_windup(&mut self, r_wu: R::Si, holding: &mut Holding<R::Si>) {
+        let contact = &self.holders.contact;
+        let roll = contact.shipping_roll(r_wu, R::Si::ZERO);
         let moved = self.state().speeds();
         let mut settled = moved;
-        c.windup.settle(&mut settled, &roll, holding);
+        contact.settle(&mut settled, &roll, holding);
         self.nips = holding.parts.nips;
         // only what has been changed loses what its sum carries
-        let put = |sum: &mut R::Sum, from: R, to: R| {
+        let speed = self.scale.speed;
+        let put = |sum: &mut R::Sum, from: R::Si, to: R::Si| {
             if from != to {
-                *sum = R::Sum::at(to);
+                *sum = R::Sum::at(R::of_si(to, speed));
             }
         };
         let [rd, fd, rr] = settled.rolls;
         put(&mut self.state.v[SPANS - 1], moved.rolls[0], rd);
-        put(&mut self.state.windup[0], moved.rolls[1], fd);
-        put(&mut self.state.windup[1], moved.rolls[2], rr);
-        put(&mut self.state.windup[2], moved.wu, settled.wu);
+        put(&mut self.apart[0], moved.rolls[1], fd);
+        put(&mut self.apart[1], moved.rolls[2], rr);
+        put(&mut self.apart[2], moved.wu, settled.wu);
     }
 
     /// A step so violent that its numbers overflow leaves a wreck: the web torn, the machine at standstill, the
     /// rolls as they were. So the state stays finite whatever the motors do.
-    fn stop_wreck(&mut self, before: &State<R, SPANS>) {
-        // one number that is not finite makes the sum so
-        let x = self.state();
-        let sum = |values: &[R]| values.iter().fold(R::ZERO, |sum, x| sum + *x);
-        let radii = x.omega_uw + x.r_uw + x.r_wu + x.travel;
-        if (sum(&x.strain) + sum(&x.v) + sum(&x.windup) + radii).is_finite() {
+    fn stop_wreck(&mut self, before: &State<R, SPANS, 0>) {
+        let whole = R::sound(self.state.map(|sum| sum.value()).iter());
+        if whole && (!self.holders.slips || R::sound(self.apart.iter().map(|sum| sum.value()))) {
             return;
         }
         self.state = before.map(|_| R::Sum::at(R::ZERO));
         self.state.r_uw = R::Sum::at(before.r_uw);
         self.state.r_wu = R::Sum::at(before.r_wu);
+        self.apart = [R::Sum::at(R::ZERO); ROLLS];
         self.nips = [Nip::Sticks; ROLLS];
         self.break_web();
     }
 
-    fn look_at_winding(&mut self, holding: &Holding<R>) {
-        let c = &self.coefficients;
-        let (t_sr, front) = (self.web.tension[SPANS - 1], holding.nip_force[FRONT]);
-        let tight = c.nips.wound_on_tension(&self.winding.nip_load, t_sr, front);
+    fn look_at_winding(&mut self, holding: &Holding<R::Si>) {
+        let nips = &self.holders.nips;
+        let t_sr = self.web.tension[SPANS - 1].to_si(self.scale.force);
+        let front = holding.nip_force[FRONT];
+        let tight = nips.wound_on_tension(&self.winding.nip_load, t_sr, front);
         self.winding = Winding {
             nip_force: holding.nip_force,
             nip_load: self.winding.nip_load,
             slides: self.nips.map(|nip| nip != Nip::Sticks),
             wound_on_tension: tight,
-            burst: self.winding.burst || tight > c.strength_per_width,
+            burst: self.winding.burst || tight > self.holders.strength,
         };
     }
 
     /// The web breaks when it is torn, when the parent roll has run out, and when it has been pulled off the core.
     fn break_web_if_due(&mut self) {
-        let c = &self.coefficients;
-        let torn = |t: &R| *t > c.strength || !t.is_finite();
-        let torn = self.web.tension.iter().any(torn);
-        let expired = self.state.r_uw.value() <= c.expire_radius;
-        let pulled_off = self.state.r_wu.value() < c.bare_radius;
+        let limits = &self.limits;
+        // what is not a number holds nothing
+        let holds = |t: &R| *t <= limits.strength;
+        let torn = !self.web.tension.iter().all(holds);
+        let expired = self.state.r_uw.value() <= limits.expire_radius;
+        let pulled_off = self.state.r_wu.value() < limits.bare_radius;
         if pulled_off {
-            self.state.r_wu = R::Sum::at(c.core_radius);
+            self.state.r_wu = R::Sum::at(limits.core_radius);
         }
         if self.threaded && (torn || expired || pulled_off) {
             self.break_web();
         }
     }
 
-    fn measure(&mut self) -> Measurements<R> {
-        let x = self.state();
+    fn measure(&mut self, faults: &SensorFaults<R::Si>) -> Measurements<R::Si> {
+        let (x, scale) = (&self.state, &self.scale);
+        let speed = |sum: &R::Sum| sum.value().to_si(scale.speed);
+        let v_rd = speed(&x.v[SPANS - 1]);
         let sight = Sight {
-            omega_uw: x.omega_uw,
-            v: x.speeds().rolls,
-            travel: x.travel,
-            r_wu: x.r_wu,
+            omega_uw: x.omega_uw.value().to_si(scale.omega),
+            v: if self.holders.slips {
+                [v_rd, speed(&self.apart[0]), speed(&self.apart[1])]
+            } else {
+                [v_rd; ROLLS]
+            },
+            travel: x.travel.value().to_si(scale.travel),
+            r_wu: x.r_wu.value().to_si(scale.r_wu),
         };
+        let tension = self.tension();
         Measurements {
             brakes: self.closed,
-            ..self.sensors.look(&sight, &self.web.tension)
+            ..self.sensors.look(&sight, &tension, faults)
         }
     }
 }
@@ -438,45 +559,28 @@ impl<T: Copy, const SPANS: usize> State<T, SPANS> {
     }
 }
 
-impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
+impl<R: Real> Holders<R> {
     fn new(machine: &Machine, h: f64) -> Self {
-        let roll = |i: usize| machine.idle.get(i);
-        let (web, brakes) = (&machine.web, &machine.brakes);
-        let law = Law::SetValued {
+        let brakes = &machine.brakes;
+        let karnopp = (brakes.karnopp_m_s > 0.0).then(|| R::of(brakes.karnopp_m_s));
+        let set_valued = Law::SetValued {
             per_step: R::of(1.0 / h),
         };
-        let brake = |force: f64| Brake::closed(R::of(force), R::of(brakes.static_ratio), law);
-        let mut coefficients = Self {
-            spans: Spans::new(
-                core::array::from_fn(|i| roll(i).map_or(machine.last_span_m, |r| r.span_m)),
-                web.stiffness_n_m * web.width_m,
-                web.retardation_s,
-            ),
-            idle: core::array::from_fn(|i| roll(i).map(Idle::new)),
-            unwind: Unwind::new(machine),
-            windup: Windup::new(machine, h),
+        let at_surface = karnopp.map_or(set_valued, |band| Law::Karnopp { band });
+        let brake = |force: f64, law| Brake::closed(R::of(force), R::of(brakes.static_ratio), law);
+        Self {
+            parent: ParentRoll::new(machine),
+            contact: Contact::new(machine, h),
             nips: Nips::new(machine),
             slips: machine.nips.slip,
-            rk4: Rk4::new(h),
             brakes: Brakes {
-                uw: brake(brakes.uw_n_m),
-                rd: brake(brakes.rd_n_m / machine.rear_drum.radius_m),
-                fd: brake(brakes.fd_n_m / machine.front_drum.radius_m),
+                uw: brake(brakes.uw_n_m, set_valued),
+                rd: brake(brakes.rd_n_m / machine.rear_drum.radius_m, at_surface),
+                fd: brake(brakes.fd_n_m / machine.front_drum.radius_m, at_surface),
             },
-            karnopp: (brakes.karnopp_m_s > 0.0).then(|| R::of(brakes.karnopp_m_s)),
-            strength: R::of(web.strength_n_m * web.width_m),
-            strength_per_width: R::of(web.strength_n_m),
-            core_radius: R::of(machine.shipping_roll.core_radius_m),
-            bare_radius: R::of(BARE * machine.shipping_roll.core_radius_m),
-            full_radius: R::of(machine.parent_roll.full_radius_m),
-            expire_radius: R::of(machine.parent_roll.expire_radius_m),
-            threaded_strain: R::of(THREADED_STRAIN),
-        };
-        if let Some(band) = coefficients.karnopp {
-            coefficients.brakes.rd = coefficients.brakes.rd.following(Law::Karnopp { band });
-            coefficients.brakes.fd = coefficients.brakes.fd.following(Law::Karnopp { band });
+            karnopp,
+            strength: R::of(machine.web.strength_n_m),
         }
-        coefficients
     }
 
     /// Nip loads and wound-on tension are wanted.
@@ -491,37 +595,34 @@ impl<R: Real, const SPANS: usize> Coefficients<R, SPANS> {
             None => self.brakes.uw,
         }
     }
+}
 
-    #[inline(always)]
-    fn web(&self, x: &State<R, SPANS>, offsets: &Offsets<R, SPANS>) -> Web<R, SPANS> {
-        let v_uw = x.omega_uw * x.r_uw;
-        self.spans
-            .web(v_uw + offsets.uw, &offsets.added_to(&x.v), &x.strain)
+impl<R: Scalar> Limits<R> {
+    fn new(machine: &Machine, units: &Units) -> Self {
+        let (roll, core) = (&machine.parent_roll, machine.shipping_roll.core_radius_m);
+        Self {
+            strength: R::coefficient(machine.web.strength_n_m * machine.web.width_m / units.force),
+            core_radius: R::coefficient(core / units.r_wu),
+            bare_radius: R::coefficient(BARE * core / units.r_wu),
+            full_radius: R::coefficient(roll.full_radius_m / units.r_uw),
+            expire_radius: R::coefficient(roll.expire_radius_m / units.r_uw),
+            threaded_strain: R::coefficient(THREADED_STRAIN / units.strain),
+        }
     }
+}
 
-    #[inline(always)]
-    fn rates(&self, x: &State<R, SPANS>, web: &Web<R, SPANS>, load: &Load<R>) -> State<R, SPANS> {
-        let (v_rd, t_sr) = (x.v[SPANS - 1], web.tension[SPANS - 1]);
-        let roll = self.windup.shipping_roll(x.r_wu, v_rd * load.layer);
-        let windup = self.windup.rates(&x.speeds(), &roll, t_sr, &load.windup);
-        let v_uw = x.omega_uw * x.r_uw;
-        let torque = self.unwind.torque(load.uw, web.tension[0], v_uw, x.r_uw);
-        let [rd, fd, rr] = windup.rolls;
-        State {
-            strain: web.strain_rate,
-            v: core::array::from_fn(|i| match &self.idle[i] {
-                Some(idle) => idle.acceleration(x.v[i], web.tension[i], web.tension[i + 1]),
-                None => rd,
-            }),
-            windup: [fd, rr, windup.wu],
-            omega_uw: torque / self.unwind.inertia(x.r_uw),
-            r_uw: if load.threaded {
-                self.unwind.radius_rate(x.omega_uw)
-            } else {
-                R::ZERO
-            },
-            r_wu: roll.radius_rate,
-            travel: v_rd,
+impl<R: Scalar> Scale<R> {
+    fn new(units: &Units) -> Self {
+        Self {
+            speed: R::unit(units.speed),
+            strain: R::unit(units.strain),
+            force: R::unit(units.force),
+            torque: R::unit(units.torque()),
+            omega: R::unit(units.omega()),
+            r_uw: R::unit(units.r_uw),
+            r_wu: R::unit(units.r_wu),
+            travel: R::unit(units.travel),
+            one: R::unit(1.0),
         }
     }
 }

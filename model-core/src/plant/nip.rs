@@ -16,6 +16,8 @@ const GRAVITY: f64 = 9.806_65;
 pub struct Nips<R> {
     /// μ·W, m: nip force per width to tangential force.
     friction: R,
+    /// Share of it that worn drums have left.
+    left: R,
     static_ratio: R,
     /// R_d + s/2 and R_d, of the rear and of the front drum, m.
     half_distance: [R; 2],
@@ -57,6 +59,7 @@ impl<R: Real> Nips<R> {
         let weight = core::f64::consts::PI * machine.web.density_kg_m3() * GRAVITY;
         Self {
             friction: R::of(nips.friction * machine.web.width_m),
+            left: R::ONE,
             static_ratio: R::of(nips.static_ratio),
             half_distance: drums.map(|r| R::of(r + 0.5 * nips.drum_gap_m)),
             drum: drums.map(R::of),
@@ -97,14 +100,21 @@ impl<R: Real> Nips<R> {
         [drum(0), drum(1), rider]
     }
 
+    /// Drums that have lost a share of their friction; tells whether they have.
+    pub fn wear(&mut self, lost: R) -> bool {
+        self.left = R::ONE - lost.clamp(R::ZERO, R::ONE);
+        lost > R::ZERO
+    }
+
     /// Largest tangential force of each nip while it slides, μ·N·W, N.
     pub fn traction(&self, loads: &[R; ROLLS]) -> [R; ROLLS] {
-        loads.map(|load| self.friction * load)
+        let [rd, fd, rr] = loads.map(|load| self.friction * load);
+        [self.left * rd, self.left * fd, rr]
     }
 
     /// The same for a nip that sticks.
     pub fn static_traction(&self, loads: &[R; ROLLS]) -> [R; ROLLS] {
-        loads.map(|load| self.static_ratio * self.friction * load)
+        self.traction(loads).map(|force| self.static_ratio * force)
     }
 
     /// WOT = k_t·t_sr/W + μ_ww·N/(1 + N/N_0) + k_F·F_fd/W, N/m

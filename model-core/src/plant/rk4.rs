@@ -2,19 +2,20 @@
 //!
 //! Not here: step control. The step is the period of the task that calls it.
 
-use crate::real::{Real, Sum};
+use crate::real::{Accumulator, Arithmetic};
 
 /// A set of state variables, for every web span one strain and the speed of the roll at its end.
 ///
-/// `T` is a value, a rate, or a running sum.
+/// `T` is a value, a rate, or a running sum. `APART` of the windup's rolls have speeds of their own: all three other
+/// than the rear drum, or, where the windup turns as one body, none.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State<T, const SPANS: usize> {
+pub struct State<T, const SPANS: usize, const APART: usize = 3> {
     /// Strain of the spans ε, from the unwind on.
     pub strain: [T; SPANS],
     /// Surface speed of the roll at the end of each span, m/s; the last one is the rear drum's, V_rd.
     pub v: [T; SPANS],
     /// Surface speeds of the other rolls of the windup, m/s: front drum, rider roll, shipping roll.
-    pub windup: [T; 3],
+    pub windup: [T; APART],
     /// Angular velocity of the parent roll, rad/s.
     pub omega_uw: T,
     /// Radius of the parent roll, m.
@@ -25,10 +26,10 @@ pub struct State<T, const SPANS: usize> {
     pub travel: T,
 }
 
-impl<T: Copy, const SPANS: usize> State<T, SPANS> {
+impl<T: Copy, const SPANS: usize, const APART: usize> State<T, SPANS, APART> {
     /// Applies `f` to every variable.
     #[inline(always)]
-    pub fn map<U>(&self, mut f: impl FnMut(T) -> U) -> State<U, SPANS> {
+    pub fn map<U>(&self, mut f: impl FnMut(T) -> U) -> State<U, SPANS, APART> {
         State {
             strain: self.strain.map(&mut f),
             v: self.v.map(&mut f),
@@ -44,9 +45,9 @@ impl<T: Copy, const SPANS: usize> State<T, SPANS> {
     #[inline(always)]
     pub fn zip<U: Copy, V>(
         &self,
-        other: &State<U, SPANS>,
+        other: &State<U, SPANS, APART>,
         mut f: impl FnMut(T, U) -> V,
-    ) -> State<V, SPANS> {
+    ) -> State<V, SPANS, APART> {
         State {
             strain: core::array::from_fn(|i| f(self.strain[i], other.strain[i])),
             v: core::array::from_fn(|i| f(self.v[i], other.v[i])),
@@ -59,49 +60,42 @@ impl<T: Copy, const SPANS: usize> State<T, SPANS> {
     }
 
     /// Every variable in a fixed order.
-    pub fn iter(&self) -> impl Iterator<Item = T> {
+    pub fn iter(&self) -> impl Iterator<Item = T> + use<T, SPANS, APART> {
         let rest = [self.omega_uw, self.r_uw, self.r_wu, self.travel];
         let speeds = self.v.into_iter().chain(self.windup);
         self.strain.into_iter().chain(speeds).chain(rest)
     }
-}
 
-/// The step's factors.
-#[derive(Clone, Copy, Debug)]
-pub struct Rk4<R> {
-    half: R,
-    whole: R,
-    sixth: R,
-}
-
-impl<R: Real> Rk4<R> {
-    /// For a step of `h` seconds.
-    pub fn new(h: f64) -> Self {
-        Self {
-            half: R::of(h / 2.0),
-            whole: R::of(h),
-            sixth: R::of(h / 6.0),
+    /// The same state with other rolls apart.
+    pub fn with_apart<const OTHER: usize>(&self, windup: [T; OTHER]) -> State<T, SPANS, OTHER> {
+        State {
+            strain: self.strain,
+            v: self.v,
+            windup,
+            omega_uw: self.omega_uw,
+            r_uw: self.r_uw,
+            r_wu: self.r_wu,
+            travel: self.travel,
         }
     }
+}
 
-    /// Advances the sums by x(t + h) = x + h/6·(k1 + 2·k2 + 2·k3 + k4), with `k1` the rates at the start.
-    #[inline(always)]
-    pub fn step<const SPANS: usize>(
-        &self,
-        sums: &mut State<R::Sum, SPANS>,
-        k1: State<R, SPANS>,
-        rates: impl Fn(&State<R, SPANS>) -> State<R, SPANS>,
-    ) {
-        let x = sums.map(|s| s.value());
-        let k2 = rates(&x.zip(&k1, |x, k| x + self.half * k));
-        let k3 = rates(&x.zip(&k2, |x, k| x + self.half * k));
-        let k4 = rates(&x.zip(&k3, |x, k| x + self.whole * k));
-        let outer = k1.zip(&k4, |a, b| a + b);
-        let inner = k2.zip(&k3, |a, b| a + b);
-        let increment = outer.zip(&inner, |o, i| self.sixth * (o + (i + i)));
-        *sums = sums.zip(&increment, |mut sum, increment| {
-            sum.add(increment);
-            sum
-        });
-    }
+/// Advances the sums by x(t + h) = x + h/6·(k1 + 2·k2 + 2·k3 + k4), with `k1` the rates at the start; rates come for a
+/// sixth of the step.
+#[inline(always)]
+pub fn advance<A: Arithmetic, const SPANS: usize, const APART: usize>(
+    sums: &mut State<A::Sum, SPANS, APART>,
+    k1: State<A::Rate, SPANS, APART>,
+    rates: impl Fn(&State<A, SPANS, APART>) -> State<A::Rate, SPANS, APART>,
+) {
+    let k2 = rates(&sums.zip(&k1, |sum, k| sum.after_half(k)));
+    let k3 = rates(&sums.zip(&k2, |sum, k| sum.after_half(k)));
+    let k4 = rates(&sums.zip(&k3, |sum, k| sum.after_whole(k)));
+    let outer = k1.zip(&k4, |a, b| a + b);
+    let inner = k2.zip(&k3, |a, b| a + b);
+    let change = outer.zip(&inner, |outer, inner| outer + (inner + inner));
+    *sums = sums.zip(&change, |mut sum, change| {
+        sum.advance(change);
+        sum
+    });
 }

@@ -1,8 +1,8 @@
 //! What can be measured on the winder, and how.
 //!
-//! Not here: noise, and sensors that fail.
+//! Not here: noise. Sensors fail only where a test makes them.
 
-use crate::exchange::{BySection, Measurements};
+use crate::exchange::{BySection, Measurements, SensorFaults};
 use crate::machine::{DrivenRoll, Machine};
 use crate::real::Real;
 
@@ -19,6 +19,11 @@ struct Coefficients<R> {
     load_cell_roll: usize,
     before: R,
     after: R,
+    /// The load cells' wrap angle, and the one they are calibrated for, rad.
+    wrap: f64,
+    calibrated_wrap: f64,
+    /// Step of the sensors, s.
+    h: R,
     /// What the amplifier shows without web, N.
     zero: R,
 }
@@ -28,9 +33,19 @@ struct Coefficients<R> {
 pub struct Sensors<R> {
     coefficients: Coefficients<R>,
     tension: R,
+    /// Error of the wrap angle, rad, and sin(β/2)/sin(β_cal/2) with it.
+    wrap_error: R,
+    gain: R,
+    /// How far the zero has wandered off, N.
+    wandered: R,
     count: u32,
     /// Way since the last pulse, in pulses.
     fraction: R,
+}
+
+/// sin(β/2)/sin(β_cal/2): what the load cells show of a tension.
+fn gain(wrap: f64, calibrated: f64) -> f64 {
+    libm::sin(0.5 * wrap) / libm::sin(0.5 * calibrated)
 }
 
 /// What the sensors look at.
@@ -50,8 +65,7 @@ impl<R: Real> Sensors<R> {
     pub fn new(machine: &Machine, h: f64) -> Self {
         let per_radius = |roll: &DrivenRoll| R::of(1.0 / roll.radius_m);
         let cells = &machine.load_cells;
-        let sine = |wrap: f64| libm::sin(0.5 * wrap);
-        let gain = sine(cells.wrap_rad) / sine(cells.calibrated_wrap_rad);
+        let calibrated = cells.calibrated_wrap_rad;
         let before = if cells.both_spans { 0.5 } else { 0.0 };
         let circumference = core::f64::consts::TAU * machine.rear_drum.radius_m;
         Self {
@@ -65,11 +79,17 @@ impl<R: Real> Sensors<R> {
                 },
                 pulses: R::of(machine.encoder_pulses / circumference),
                 load_cell_roll: cells.roll,
-                before: R::of(gain * before),
-                after: R::of(gain * (1.0 - before)),
-                zero: R::of(0.5 * cells.tare_n / sine(cells.calibrated_wrap_rad)),
+                before: R::of(before),
+                after: R::of(1.0 - before),
+                wrap: cells.wrap_rad,
+                calibrated_wrap: calibrated,
+                h: R::of(h),
+                zero: R::of(0.5 * cells.tare_n / libm::sin(0.5 * calibrated)),
             },
             tension: R::ZERO,
+            wrap_error: R::ZERO,
+            gain: R::of(gain(cells.wrap_rad, calibrated)),
+            wandered: R::ZERO,
             count: 0,
             fraction: R::ZERO,
         }
@@ -78,33 +98,59 @@ impl<R: Real> Sensors<R> {
     /// One look, every step of the plant.
     ///
     /// The load cells carry F = (t_before + t_after)·sin(β/2) + tare and show F/(2·sin(β_cal/2)), filtered. Where
-    /// they do not feel both spans, t_after stands for t_before.
+    /// they do not feel both spans, t_after stands for t_before. A drift adds to the tare as time goes.
     pub fn look<const SPANS: usize>(
         &mut self,
         sight: &Sight<R>,
         tension: &[R; SPANS],
+        faults: &SensorFaults<R>,
     ) -> Measurements<R> {
-        let c = &self.coefficients;
-        let shown = c.before * tension[c.load_cell_roll] + c.after * tension[c.load_cell_roll + 1];
-        self.tension += c.filter * (shown + c.zero - self.tension);
-
-        let way = self.fraction + sight.travel * c.pulses;
-        let whole = way.floor_i32();
-        self.count = self.count.wrapping_add_signed(whole);
-        self.fraction = way - R::of_i32(whole);
-
+        self.weigh(tension, faults);
         let [rd, fd, rr] = sight.v;
+        let c = &self.coefficients;
+        let heard = |silent: bool, omega: R| if silent { R::ZERO } else { omega };
+        let omega = BySection {
+            uw: heard(faults.encoder_uw, sight.omega_uw),
+            rd: heard(faults.encoder_rd, rd * c.per_radius.rd),
+            fd: fd * c.per_radius.fd,
+            rr: rr * c.per_radius.rr,
+        };
+        if !faults.encoder_rd {
+            self.count_pulses(sight.travel);
+        }
         Measurements {
-            omega: BySection {
-                uw: sight.omega_uw,
-                rd: rd * c.per_radius.rd,
-                fd: fd * c.per_radius.fd,
-                rr: rr * c.per_radius.rr,
-            },
+            omega,
             tension: self.tension,
             d_wu: sight.r_wu + sight.r_wu,
             pulses_rd: self.count,
             brakes: Default::default(),
         }
+    }
+
+    fn weigh<const SPANS: usize>(&mut self, tension: &[R; SPANS], faults: &SensorFaults<R>) {
+        let c = &self.coefficients;
+        if faults.wrap_error != self.wrap_error {
+            self.wrap_error = faults.wrap_error;
+            let wrap = c.wrap + faults.wrap_error.to_f64();
+            self.gain = R::of(gain(wrap, c.calibrated_wrap));
+        }
+        self.wandered = if faults.drift == R::ZERO {
+            R::ZERO
+        } else {
+            self.wandered + faults.drift * c.h
+        };
+        if faults.load_cell_stuck {
+            return;
+        }
+        let felt = c.before * tension[c.load_cell_roll] + c.after * tension[c.load_cell_roll + 1];
+        let shown = self.gain * felt + c.zero + self.wandered;
+        self.tension += c.filter * (shown - self.tension);
+    }
+
+    fn count_pulses(&mut self, travel: R) {
+        let way = self.fraction + travel * self.coefficients.pulses;
+        let whole = way.floor_i32();
+        self.count = self.count.wrapping_add_signed(whole);
+        self.fraction = way - R::of_i32(whole);
     }
 }

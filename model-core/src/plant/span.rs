@@ -2,49 +2,62 @@
 //!
 //! Not here: out-of-plane motion, wrinkles, temperature, moisture. Strain is uniform along a span.
 
-use crate::real::Real;
+use super::units::Units;
+use crate::real::{Arithmetic, Scalar};
 
 /// The coefficients of all spans, which carry the same web.
 #[derive(Clone, Copy, Debug)]
-pub struct Spans<R, const SPANS: usize> {
-    /// 1/L of each span, 1/m.
-    per_length: [R; SPANS],
+pub struct Spans<A: Arithmetic, const SPANS: usize> {
+    /// h/6·1/L of each span.
+    per_length: [A::Gain; SPANS],
     /// EA, N.
-    stiffness: R,
-    /// d = EA·τ_v, N·s.
-    viscosity: R,
+    stiffness: A,
+    /// d/L = EA·τ_v/L of each span, N·s/m.
+    viscosity: [A; SPANS],
 }
 
-/// Rate of strain and tension of all spans at one instant.
+/// Change of strain and tension of all spans at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Web<R, const SPANS: usize> {
-    /// ε̇, 1/s.
-    pub strain_rate: [R; SPANS],
+pub struct Web<A: Arithmetic, const SPANS: usize> {
+    /// ε̇, for a sixth of a step.
+    pub strain_rate: [A::Rate; SPANS],
     /// t, N, total across the width.
-    pub tension: [R; SPANS],
+    pub tension: [A; SPANS],
 }
 
-impl<R: Real, const SPANS: usize> Web<R, SPANS> {
+impl<A: Arithmetic, const SPANS: usize> Web<A, SPANS> {
     /// No web: no strain moves, nothing pulls.
-    pub const NONE: Self = Self {
-        strain_rate: [R::ZERO; SPANS],
-        tension: [R::ZERO; SPANS],
-    };
-}
-
-impl<R: Real, const SPANS: usize> Spans<R, SPANS> {
-    /// From lengths in m, EA in N and the retardation time in s.
-    pub fn new(lengths: [f64; SPANS], stiffness_n: f64, retardation_s: f64) -> Self {
+    #[inline(always)]
+    pub fn none() -> Self {
         Self {
-            per_length: lengths.map(|l| R::of(1.0 / l)),
-            stiffness: R::of(stiffness_n),
-            viscosity: R::of(stiffness_n * retardation_s),
+            strain_rate: [A::no_rate(); SPANS],
+            tension: [A::ZERO; SPANS],
         }
     }
+}
 
+impl<R: Scalar, const SPANS: usize> Spans<R, SPANS> {
+    /// From lengths in m, EA in N and the retardation time in s, for steps of `h` seconds.
+    pub fn new(
+        lengths: [f64; SPANS],
+        stiffness_n: f64,
+        retardation_s: f64,
+        units: &Units,
+        h: f64,
+    ) -> Self {
+        let viscosity = stiffness_n * retardation_s * units.speed / units.force;
+        Self {
+            per_length: lengths.map(|l| R::gain(h / 6.0 * units.speed / (l * units.strain))),
+            stiffness: R::coefficient(stiffness_n * units.strain / units.force),
+            viscosity: lengths.map(|l| R::coefficient(viscosity / l)),
+        }
+    }
+}
+
+impl<A: Arithmetic, const SPANS: usize> Spans<A, SPANS> {
     /// The strain at which a span carries the tension, at rest.
-    pub fn strain_of(&self, tension: R) -> R {
-        tension / self.stiffness
+    pub fn strain_of(&self, tension: A) -> A {
+        tension.over(self.stiffness)
     }
 
     /// Continuity of mass, exact in the strain, and a Kelvin–Voigt web that cannot push:
@@ -57,21 +70,21 @@ impl<R: Real, const SPANS: usize> Spans<R, SPANS> {
     /// Source: J. J. Shelton, "Dynamics of web tension control with velocity or torque control", ACC 1986, for
     /// the exact form; H. Koç et al., IEEE TCST 10 (2002) 179, figure 3, for its check.
     #[inline(always)]
-    pub fn web(&self, v_in: R, v: &[R; SPANS], strain: &[R; SPANS]) -> Web<R, SPANS> {
-        let mut web = Web::NONE;
-        let (mut v_up, mut strain_up, mut stretch_up) = (v_in, R::ZERO, R::ONE);
+    pub fn web(&self, v_in: A, v: &[A; SPANS], strain: &[A; SPANS]) -> Web<A, SPANS> {
+        let mut web = Web::none();
+        let (mut v_up, mut strain_up, mut stretch_up) = (v_in, A::ZERO, A::ONE);
         for i in 0..SPANS {
-            let stretch = R::ONE + strain[i];
-            let flow = (v[i] - v_up) + v[i] * strain_up - v_up * strain[i];
-            // the parent roll gives off unstrained web: no division in the first span
-            let ratio = if i == 0 {
-                stretch
+            let stretch = A::stretch(strain[i]);
+            let (draw, less) = (v[i] - v_up, v_up.strained(strain[i]));
+            // L·ε̇; the parent roll gives off unstrained web
+            let flow = if i == 0 {
+                (draw - less) * stretch
             } else {
-                stretch / stretch_up
+                (draw + (v[i].strained(strain_up) - less)) * stretch.over(stretch_up)
             };
-            web.strain_rate[i] = self.per_length[i] * ratio * flow;
+            web.strain_rate[i] = flow.rate(self.per_length[i]);
             web.tension[i] =
-                (self.stiffness * strain[i] + self.viscosity * web.strain_rate[i]).max(R::ZERO);
+                (strain[i].elastic(self.stiffness) + self.viscosity[i] * flow).positive();
             (v_up, strain_up, stretch_up) = (v[i], strain[i], stretch);
         }
         web
