@@ -62,7 +62,7 @@ pub fn play<'a>(
                 trajectory: feedback.double(&image::TRAJECTORY),
             });
         }
-        link.write(player.commands())?;
+        link.write_all(player.commands())?;
         thread::sleep(PERIOD.saturating_sub(began.elapsed()));
     }
 }
