@@ -1,6 +1,7 @@
 //! The subcommands of `winder`, a module each.
 
 pub mod demo;
+pub mod figures;
 pub mod machine;
 pub mod replay;
 pub mod run;
