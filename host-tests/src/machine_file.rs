@@ -93,7 +93,7 @@ impl Description {
         }
         let mut open = "";
         for parameter in present().filter(|p| !split(p).0.is_empty()) {
-            let (table, key) = split(parameter);
+            let (table, _) = split(parameter);
             if parameter.length_of().is_some() {
                 write!(out, "\n# {}", self.about(parameter))?;
                 continue;
@@ -105,36 +105,17 @@ impl Description {
                 }
                 open = table;
             }
-            // of a list of plain values the first element stands for all
-            if !key.ends_with(']') || key.ends_with("[0]") {
-                self.write_line(out, parameter)?;
-            }
+            self.write_line(out, parameter)?;
         }
         Ok(())
     }
 
     fn write_line(&self, out: &mut dyn Write, parameter: &Parameter) -> io::Result<()> {
         let (_, key) = split(parameter);
-        let value = |p: &Parameter| {
-            p.get(&self.machine)
-                .map_or(String::new(), |v| v.to_string())
-        };
-        let (assignment, about) = match key.strip_suffix("[0]") {
-            None => (
-                format!("{key} = {}", value(parameter)),
-                self.about(parameter),
-            ),
-            Some(list) => {
-                let prefix = parameter.name.trim_end_matches("0]");
-                let all = || parameters().filter(|p| p.name.starts_with(prefix));
-                let values: Vec<_> = all().map(value).collect();
-                let abouts: Vec<_> = all().map(|p| self.about(p)).collect();
-                (
-                    format!("{list} = [{}]", values.join(", ")),
-                    abouts.join("; "),
-                )
-            }
-        };
+        let value = parameter.get(&self.machine);
+        let value = value.map_or(String::new(), |value| value.to_string());
+        let assignment = format!("{key} = {value}");
+        let about = self.about(parameter);
         writeln!(out, "{assignment:<COMMENT_COLUMN$}# {about}")
     }
 
@@ -292,13 +273,6 @@ impl<'a> Reader<'a> {
             let name_i = format!("{name}[{i}]");
             let at = element.span().start;
             let fields = elements(&self.machine, &name_i);
-            if fields.is_empty() {
-                let reason = anyhow!(
-                    "{name} has no more than {i} values, but {} are given",
-                    array.len()
-                );
-                return Err((Some(at), reason));
-            }
             self.value(&name_i, at, element)?;
             self.complete(&fields)
                 .map_err(|reason| (Some(at), reason))?;
@@ -435,20 +409,23 @@ mod tests {
     #[test]
     fn a_file_names_only_what_differs_from_its_preset() {
         let text = "preset = 'news-8000'\nlast_span_m = 3\nencoder_pulses = 0x400\n\
-                    motors.uw.power_w = 6e5\noperation.front_share = [0.5, 0.4]\n\
+                    motors.uw.power_w = 6e5\n\
+                    operation.front_share = [{diameter_m=0.1, share=0.5}, {diameter_m=1, share=0.4}]\n\
                     [nips]\nslip = true\n[[nips.rider_load]]\ndiameter_m = 1.0\nload_n_m = 400\n";
         let machine = read(text).unwrap().machine;
         let mut expected = Machine::news_8000();
         expected.last_span_m = 3.0;
         expected.encoder_pulses = 1024.0;
         expected.motors.uw.power_w = 600e3;
-        expected.operation.front_share = [0.5, 0.4];
+        let shares = &mut expected.operation.front_share;
+        shares[0].share = 0.5;
+        (shares[1].diameter_m, shares[1].share) = (1.0, 0.4);
         expected.nips.slip = true;
         expected.nips.rider_load.truncate(1);
         expected.nips.rider_load[0].diameter_m = 1.0;
         expected.nips.rider_load[0].load_n_m = 400.0;
         assert_eq!(machine, expected);
-        assert_eq!(expected.differences(&Machine::news_8000()).count(), 9);
+        assert_eq!(expected.differences(&Machine::news_8000()).count(), 10);
     }
 
     #[test]
@@ -541,16 +518,12 @@ mod tests {
                 "m.toml:4: there is no parameter idle[0].spam_m; the nearest is idle[0].span_m",
             ),
             (
-                "{}\noperation.front_share = [0.5]",
-                "m.toml:3: operation.front_share[1] is missing",
+                "{}\noperation.front_share = [{diameter_m=1}]",
+                "m.toml:3: operation.front_share[0].share is missing",
             ),
             (
-                "{}\noperation.front_share = [0.5, 2]",
-                "m.toml:3: operation.front_share[1] = 2 is outside 0 to 1",
-            ),
-            (
-                "{}\noperation.front_share = [0, 0, 0]",
-                "m.toml:3: operation.front_share has no more than 2 values, but 3 are given",
+                "{}\noperation.front_share = [{diameter_m=1, share=2}]",
+                "m.toml:3: operation.front_share[0].share = 2 is outside 0 to 1",
             ),
             (
                 "preset = 'NEWS-8000-UNLUMPED'\nidle = [{span_m=1, radius_m=1, inertia_kg_m2=1, friction_n_s_m=1, eccentricity_m=0}]",

@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use model_core::exchange::{Actuators, Brakes, BySection};
+use model_core::fixed::Word;
 use model_core::machine::{MAX_SPANS, Machine, PRESETS};
 use model_core::plant::windup::ROLLS;
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
@@ -75,6 +76,8 @@ pub enum Scalar {
     F32,
     /// Double precision.
     F64,
+    /// Fixed point, as a microcontroller without floating-point unit.
+    Fixed,
 }
 
 /// Reads the schedule, runs the plant, writes the result.
@@ -88,6 +91,7 @@ pub fn run(options: &Options, console: &mut dyn Write) -> Result<()> {
     let simulate = match options.scalar {
         Scalar::F32 => simulate::<f32>,
         Scalar::F64 => simulate::<f64>,
+        Scalar::Fixed => simulate::<Word>,
     };
     if options.out.as_os_str() == "-" {
         simulate(&machine, &schedule, every, console)?;

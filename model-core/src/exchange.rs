@@ -16,6 +16,18 @@ pub struct BySection<T> {
     pub rr: T,
 }
 
+impl<T: Copy> BySection<T> {
+    /// The same for all four.
+    pub fn all(value: T) -> Self {
+        Self {
+            uw: value,
+            rd: value,
+            fd: value,
+            rr: value,
+        }
+    }
+}
+
 impl<T> BySection<T> {
     /// Applies `f` to every section.
     pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> BySection<U> {
@@ -182,6 +194,144 @@ pub enum UnwindControl {
     Speed,
 }
 
+/// A loop that auto-tune can set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Loop {
+    /// Speed of the windup by both drums. Without a web, from standstill, the drums' brakes open.
+    DrumSpeed,
+    /// Speed of the parent roll by the unwind. Without a web, from standstill, its brake open.
+    UnwindSpeed,
+    /// Tension of the web by the unwind. With a web under stall tension that runs at thread speed, or is about to:
+    /// tension control, drums on, brakes open.
+    Tension,
+}
+
+/// How far auto-tune is: its steps, in order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum TuneStep {
+    /// Not begun.
+    #[default]
+    Idle,
+    /// Looks whether the conditions are there, and waits for rest.
+    Check,
+    /// Speed loops: runs up with a constant torque. Tension: the first step of torque.
+    Up,
+    /// Speed loops: runs down with the same torque turned round. Tension: the step is taken back.
+    Down,
+    /// The new gains are tried.
+    Verify,
+    /// Speed loops: comes to rest.
+    Stop,
+    /// The new gains are in use.
+    Done,
+    /// Ended without a result; the old gains are in use.
+    Aborted,
+}
+
+/// Why auto-tune ended without a result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TuneAbort {
+    /// It did not.
+    #[default]
+    None,
+    /// The command was taken back.
+    Cancelled,
+    /// The rolls turned when it was to begin.
+    NotAtStandstill,
+    /// There is a web where there must be none.
+    WebPresent,
+    /// A brake of the section is closed.
+    BrakeClosed,
+    /// There is no tension, or it was lost.
+    NoTension,
+    /// The unwind is not in tension control, or the drums are off.
+    WrongControl,
+    /// The web speed is not that of thread.
+    WrongSpeed,
+    /// The torque limit is too low for the test torque.
+    TorqueLimit,
+    /// The roll turned against its torque, or ran away.
+    WrongDirection,
+    /// A step took too long.
+    TimeOut,
+    /// What was found cannot be this machine, or the new gains did not hold.
+    Implausible,
+}
+
+impl TuneStep {
+    /// A line for every step, by its number.
+    pub const TEXTS: [&str; 8] = [
+        "not begun",
+        "waiting for the conditions",
+        "torque up",
+        "torque down",
+        "trying the new gains",
+        "coming to rest",
+        "done: the new gains are in use",
+        "aborted: the old gains are in use",
+    ];
+
+    /// Its number.
+    pub fn number(self) -> u8 {
+        self as u8
+    }
+}
+
+impl TuneAbort {
+    /// A line for every code, by its number.
+    pub const TEXTS: [&str; 12] = [
+        "none",
+        "cancelled",
+        "not at standstill",
+        "there is a web",
+        "a brake is closed",
+        "no tension",
+        "unwind not in tension control, or drums off",
+        "not at thread speed",
+        "torque limit below the test torque",
+        "roll turns against its torque, or runs away",
+        "a step took too long",
+        "result implausible",
+    ];
+
+    /// Its number.
+    pub fn number(self) -> u8 {
+        self as u8
+    }
+}
+
+/// A PI regulator's setting as a commissioning engineer reads it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Setting<R> {
+    /// Proportional gain: N·m·s/rad at the unwind's or the rear drum's shaft, N/N for the tension.
+    pub gain: R,
+    /// Integral action time, s.
+    pub time: R,
+}
+
+/// What auto-tune tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Autotune<R> {
+    /// The loop that is being tuned, or was last.
+    pub of: Option<Loop>,
+    /// Where it is.
+    pub step: TuneStep,
+    /// How far, 0 to 100 %.
+    pub progress: R,
+    /// Why it ended without a result.
+    pub abort: TuneAbort,
+    /// Inertia found, kg·m², at the unwind's or the rear drum's shaft; none by the tension loop.
+    pub inertia: R,
+    /// Friction found, N·m·s/rad, at the same shaft.
+    pub friction: R,
+    /// Stiffness of the web path found, N/m; by the tension loop alone.
+    pub stiffness: R,
+    /// Setting before.
+    pub old: Setting<R>,
+    /// Setting found.
+    pub new: Setting<R>,
+}
+
 /// What the logic asks of the regulators for one drive cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveCommand<R> {
@@ -205,7 +355,7 @@ pub struct DriveCommand<R> {
     pub freeze_diameter: bool,
     /// The unwind's brake helps when its motor comes to its limit.
     pub brake_assist: bool,
-    /// Limits of the motors' torques, of rated torque.
+    /// Limits of the motors' torques, of rated torque; the motors' own overload limits them further.
     pub torque_limit: BySection<R>,
     /// Added to the front drum's share of the drum torque.
     pub front_share_trim: R,
@@ -215,6 +365,12 @@ pub struct DriveCommand<R> {
     pub handling: Handling,
     /// Faults that a test puts in, handed on to the plant.
     pub faults: Faults<R>,
+    /// Tune this loop: runs as long as it stands, aborts when it is taken back.
+    pub autotune: Option<Loop>,
+    /// A defect: the diameter estimator without its interlocks.
+    pub bare_estimator: bool,
+    /// A defect: no torque for the inertias that the ramps accelerate.
+    pub no_inertia_compensation: bool,
 }
 
 /// What the regulators tell the logic after a drive cycle.
@@ -238,4 +394,8 @@ pub struct DriveStatus<R> {
     pub load: BySection<R>,
     /// Shaft powers, W.
     pub power: BySection<R>,
+    /// Motors that have used up their overload and are limited to rated torque.
+    pub overloaded: BySection<bool>,
+    /// Auto-tune.
+    pub autotune: Autotune<R>,
 }

@@ -9,6 +9,7 @@
 //! integer; a 32-bit counter takes two words, high word first. Bit `b` of word `w` is also the single bit
 //! `16·w + b` of the block, so that a PLC can use coils or words as it likes.
 
+use crate::exchange::{TuneAbort, TuneStep};
 use crate::logic;
 use crate::machine::Machine;
 use crate::profidrive;
@@ -132,6 +133,19 @@ signals! {
 
     // more of the drive system
     WARNINGS:         Feedback 43, Winder, Bits(logic::WARNING_BITS), "", 1.0, 0.0 ..= 65535.0, "Warnings that stand";
+    BROKEN_SPAN:      Feedback 44, Simulator, U16, "", 1.0, 0.0 ..= 16.0, "Span in which the web has parted, counted from the unwind; 0 while it is whole";
+    WINDING:          Feedback 45, Simulator, Bits(logic::WINDING_BITS), "", 1.0, 0.0 ..= 65535.0, "How the shipping roll is being wound, where slip is computed";
+    WOUND_ON_TENSION: Feedback 46, Simulator, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Wound-on tension per width, where slip or compression is computed";
+    AUTOTUNE_STEP:    Feedback 47, Winder, Code(&TuneStep::TEXTS), "", 1.0, 0.0 ..= 65535.0, "Step of auto-tune";
+    AUTOTUNE_PROGRESS: Feedback 48, Winder, U16, "%", 10.0, 0.0 ..= 100.0, "How far auto-tune is";
+    AUTOTUNE_ABORT:   Feedback 49, Winder, Code(&TuneAbort::TEXTS), "", 1.0, 0.0 ..= 65535.0, "Why auto-tune ended without a result";
+    AUTOTUNE_INERTIA: Feedback 50, Winder, U32, "kg·m²", 1000.0, 0.0 ..= 4.0e6, "Inertia that auto-tune has found, at the shaft of the unwind or the rear drum";
+    AUTOTUNE_FRICTION: Feedback 52, Winder, U32, "N·m·s/rad", 1000.0, 0.0 ..= 4.0e6, "Friction that auto-tune has found, at the same shaft";
+    AUTOTUNE_STIFFNESS: Feedback 54, Winder, U32, "N/m", 1.0, 0.0 ..= 4.0e9, "Stiffness of the web path that auto-tune has found";
+    AUTOTUNE_GAIN_OLD: Feedback 56, Winder, U32, "", 1000.0, 0.0 ..= 4.0e6, "Proportional gain before auto-tune: N·m·s/rad of a speed loop, N/N of the tension loop";
+    AUTOTUNE_GAIN_NEW: Feedback 58, Winder, U32, "", 1000.0, 0.0 ..= 4.0e6, "Proportional gain that auto-tune has found";
+    AUTOTUNE_TIME_OLD: Feedback 60, Winder, U16, "s", 1000.0, 0.0 ..= 65.0, "Integral action time before auto-tune";
+    AUTOTUNE_TIME_NEW: Feedback 61, Winder, U16, "s", 1000.0, 0.0 ..= 65.0, "Integral action time that auto-tune has found";
 }
 
 /// Jog speed at power-up, m/min.

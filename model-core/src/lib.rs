@@ -11,6 +11,7 @@
 
 pub mod drive;
 pub mod exchange;
+pub mod fixed;
 pub mod image;
 pub mod logic;
 pub mod machine;

@@ -28,6 +28,35 @@ pub struct Record {
     pub ticks: u32,
     /// Hash over every state variable after every step.
     pub trajectory: u32,
+    /// What no drive can see.
+    pub truth: Truth,
+}
+
+/// Ground truth for the eyes of a person, never for a drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Truth {
+    /// Span in which the web has parted, counted from the unwind; 0 while it is whole.
+    pub broken_span: u8,
+    /// Nips that slide: bit 0 rear drum, 1 front drum, 2 rider roll.
+    pub sliding: u8,
+    /// Wound-on tension per width, N/m; 0 where it is not computed.
+    pub wound_on_tension: u16,
+    /// The shipping roll has burst.
+    pub burst: bool,
+}
+
+impl Truth {
+    fn of<R: Scalar, const SPANS: usize>(winder: &Winder<R, SPANS>) -> Self {
+        let winding = winder.winding();
+        let [rd, fd, rr] = winding.slides.map(u8::from);
+        Self {
+            broken_span: winder.broken_span(),
+            sliding: rd | fd << 1 | rr << 2,
+            // the cast saturates
+            wound_on_tension: winding.wound_on_tension.to_f32() as u16,
+            burst: winding.burst,
+        }
+    }
 }
 
 impl Record {
@@ -49,6 +78,7 @@ impl Default for Record {
         Self {
             ticks: 0,
             trajectory: Self::START,
+            truth: Truth::default(),
         }
     }
 }
@@ -66,6 +96,7 @@ impl<R: Scalar, const SPANS: usize> Plant<R, SPANS> {
     pub fn tick(&mut self, actuators: &Actuators<R::Si>) -> (Measurements<R::Si>, Record) {
         let measurements = self.winder.step(actuators);
         self.record.step(self.winder.fingerprints());
+        self.record.truth = Truth::of(&self.winder);
         (measurements, self.record)
     }
 
@@ -138,6 +169,11 @@ impl<R: Scalar, const SPANS: usize> Simulator<R, SPANS> {
         self.record
     }
 
+    /// What acts on the winder until the next drive cycle.
+    pub fn actuators(&self) -> &Actuators<R::Si> {
+        &self.actuators
+    }
+
     /// What the regulators told last.
     pub fn status(&self) -> &DriveStatus<R::Si> {
         &self.status
@@ -155,5 +191,10 @@ pub fn logic_tick<R: Real>(
 ) -> DriveCommand<R> {
     feedback.set_double(&image::PLANT_TICKS, record.ticks);
     feedback.set_double(&image::TRAJECTORY, record.trajectory);
+    let truth = &record.truth;
+    feedback.set_word(&image::BROKEN_SPAN, truth.broken_span.into());
+    let burst = u16::from(truth.burst) << 3;
+    feedback.set_word(&image::WINDING, u16::from(truth.sliding) | burst);
+    feedback.set_word(&image::WOUND_ON_TENSION, truth.wound_on_tension);
     logic.step(commands, measurements, status, feedback)
 }

@@ -17,6 +17,7 @@ use model_core::simulator::Simulator;
 pub const CYCLE: f64 = 1e-3 * DRIVE_PERIOD_MS as f64;
 
 /// The operator at the simulator.
+#[derive(Clone)]
 pub struct Operator<R: Float> {
     pub simulator: Simulator<R, 3>,
     pub image: Image,
@@ -25,6 +26,8 @@ pub struct Operator<R: Float> {
     pub silent: bool,
     /// Drive cycles since power-up.
     pub cycles: u32,
+    /// The commands of every cycle, where they are kept.
+    pub log: Option<Vec<Commands>>,
 }
 
 impl<R: Float> Operator<R> {
@@ -44,6 +47,7 @@ impl<R: Float> Operator<R> {
             machine,
             silent: false,
             cycles: 0,
+            log: None,
         }
     }
 
@@ -54,6 +58,9 @@ impl<R: Float> Operator<R> {
             self.image
                 .commands
                 .set_word(&image::HEARTBEAT_PLC, beat.wrapping_add(1));
+        }
+        if let Some(log) = &mut self.log {
+            log.push(self.image.commands);
         }
         self.simulator.drive_cycle(&mut self.image);
         self.cycles += 1;

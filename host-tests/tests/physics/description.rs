@@ -119,6 +119,12 @@ fn parameters_that_contradict_each_other_are_refused_by_name() {
             m.nips.rider_load[3].diameter_m = 0.29
         }),
         ("nips.drum_gap_m", |m| m.nips.drum_gap_m = 0.096),
+        ("operation.front_share (number of points)", |m| {
+            m.operation.front_share.clear()
+        }),
+        ("operation.front_share[1].diameter_m", |m| {
+            m.operation.front_share[1].diameter_m = 0.09
+        }),
     ];
     for (name, change) in cases {
         let mut m = Machine::news_8000();

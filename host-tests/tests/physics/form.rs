@@ -8,7 +8,7 @@ use model_core::exchange::{Actuators, BySection};
 use model_core::machine::{DrivenRoll, Machine};
 use model_core::plant::Winder;
 use model_core::plant::rk4::State;
-use model_core::real::Float;
+use model_core::real::{Real, Ring, Scalar};
 
 /// The plant's step, s.
 pub const H: f64 = 0.004;
@@ -170,7 +170,7 @@ pub fn torques(m: &Machine, x: &State<f64, 3>, t_gr: f64, a: f64) -> BySection<f
 }
 
 /// What `f32` may be off by, or what `f64` may.
-pub fn either<R: Float>(single: f64, double: f64) -> f64 {
+pub fn either<R: Scalar>(single: f64, double: f64) -> f64 {
     if size_of::<R>() == size_of::<f32>() {
         single
     } else {
@@ -179,12 +179,12 @@ pub fn either<R: Float>(single: f64, double: f64) -> f64 {
 }
 
 /// A winder under test.
-pub struct Bench<R: Float> {
+pub struct Bench<R: Scalar> {
     pub machine: Machine,
     pub winder: Winder<R, 3>,
 }
 
-impl<R: Float> Bench<R> {
+impl<R: Scalar> Bench<R> {
     /// At standstill, not threaded, in steps of [`H`].
     pub fn new(machine: Machine) -> Self {
         Self::with_step(machine, H)
@@ -199,29 +199,29 @@ impl<R: Float> Bench<R> {
     /// Threaded, in the state `x`.
     pub fn threaded(machine: Machine, x: &State<f64, 3>) -> Self {
         let mut bench = Self::new(machine);
-        bench.winder.thread_at(R::ZERO);
+        bench.winder.thread_at(R::Si::ZERO);
         bench.set(x);
         bench
     }
 
     pub fn set(&mut self, x: &State<f64, 3>) {
-        self.winder.set_state(&x.map(R::of));
+        self.winder.set_state(&x.map(R::Si::of));
     }
 
     /// The state as `f64`.
     pub fn x(&self) -> State<f64, 3> {
-        self.winder.state().map(R::to_f64)
+        self.winder.state().map(Real::to_f64)
     }
 
     /// The tensions as `f64`, N.
     pub fn t(&self) -> [f64; 3] {
-        self.winder.tension().map(R::to_f64)
+        self.winder.tension().map(Real::to_f64)
     }
 
     /// One step with torques.
     pub fn step(&mut self, torque: &BySection<f64>) {
         self.winder.step(&Actuators {
-            torque: torque.map(R::of),
+            torque: torque.map(R::Si::of),
             ..Actuators::default()
         });
     }

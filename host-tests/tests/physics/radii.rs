@@ -2,7 +2,7 @@
 
 use model_core::exchange::BySection;
 use model_core::machine::Machine;
-use model_core::plant::units::Units;
+use model_core::plant::units::{One, Units};
 use model_core::plant::windup::Windup;
 use model_core::real::Float;
 
@@ -74,7 +74,7 @@ fn radii_follow_the_length<R: Float>() {
 /// M at the core and at 1.25 m, and as a step of the winder shows it: M = F·h/ΔV.
 fn mass_of_the_windup_is_that_of_its_rolls<R: Float>() {
     let m = Machine::news_8000();
-    let windup = Windup::<R>::new(&m, &Units::SI, H);
+    let windup = Windup::<R>::new(&One(&m, &Units::SI), H);
     for (r, mass) in [(0.05, 15_061.0), (0.625, 18_459.0)] {
         let core = windup
             .mass(&windup.shipping_roll(R::of(r), R::ZERO))

@@ -3,6 +3,7 @@
 use std::fs;
 
 use host_tests::plant::{self, Options, Scalar};
+use model_core::fixed::Word;
 use model_core::machine::Machine;
 use tempfile::TempDir;
 
@@ -60,13 +61,13 @@ fn the_run_starts_at_stall_tension_and_ends_with_the_last_row() {
     }
 }
 
-/// The file has every digit of the winder's own numbers, in both scalars.
+/// The file has every digit of the winder's own numbers, in every scalar.
 #[test]
 fn numbers_round_trip() {
     let schedule = format!(
         "{HEADER},brake_uw\n0,-1000,400,400,0,0\n0.1,0,500,600,1,0\n1,0,0,0,0,1\n2,0,0,0,0,1"
     );
-    for scalar in [Scalar::F32, Scalar::F64] {
+    for scalar in [Scalar::F32, Scalar::F64, Scalar::Fixed] {
         let (_folder, mut options) = options(&schedule);
         (options.scalar, options.every_s) = (scalar, 0.1);
         let table = run(&options);
@@ -74,6 +75,7 @@ fn numbers_round_trip() {
         let expected = match scalar {
             Scalar::F32 => by_hand::<f32>(),
             Scalar::F64 => by_hand::<f64>(),
+            Scalar::Fixed => by_hand::<Word>(),
         };
         for (row, expected) in table.iter().zip(&expected) {
             assert_eq!(row[1..], expected[..], "t = {}", row[0]);
@@ -82,10 +84,11 @@ fn numbers_round_trip() {
 }
 
 /// The same schedule, step by step; every tenth of a second.
-fn by_hand<R: model_core::real::Float>() -> Vec<Vec<f64>> {
+fn by_hand<R: model_core::real::Scalar>() -> Vec<Vec<f64>> {
     use model_core::exchange::{Actuators, Brakes, BySection};
+    use model_core::real::Real;
     let mut bench = Bench::<R>::new(Machine::news_8000());
-    bench.winder.thread_at(R::of(840.0));
+    bench.winder.thread_at(R::Si::of(840.0));
     let mut rows = Vec::new();
     for step in 0..=500 {
         if step % 25 == 0 {
@@ -106,7 +109,7 @@ fn by_hand<R: model_core::real::Float>() -> Vec<Vec<f64>> {
             _ => [0.0, 0.0, 0.0, 0.0, 1.0],
         };
         bench.winder.step(&Actuators {
-            torque: BySection { uw, rd, fd, rr }.map(R::of),
+            torque: BySection { uw, rd, fd, rr }.map(R::Si::of),
             brakes: Brakes {
                 uw: brake > 0.0,
                 ..Brakes::default()

@@ -2,7 +2,7 @@
 
 use model_core::machine::Machine;
 use model_core::plant::span::Spans;
-use model_core::plant::units::Units;
+use model_core::plant::units::{One, Units};
 use model_core::real::Float;
 
 use crate::form::{self, Bench, H, RUN};
@@ -47,13 +47,7 @@ fn follow<R: Float, const SPANS: usize>(
 }
 
 fn spans<R: Float>(m: &Machine) -> Spans<R, 3> {
-    Spans::new(
-        form::lengths(m),
-        form::stiffness(m),
-        m.web.retardation_s,
-        &Units::SI,
-        SIX,
-    )
+    Spans::new(&One(m, &Units::SI), SIX)
 }
 
 /// With constant speeds 1/(1+ε) is an exact lag of L/V.
@@ -99,7 +93,10 @@ fn a_step_of_speed_changes_the_tension_by_its_stiffness<R: Float>() {
 /// H. Koç et al., IEEE TCST 10 (2002) 179, figure 3: L = 1 m, ε_1 = 5 %, V 1 → 1.01 m/s. The form that is linear
 /// in the strain gives 0.0594 and 0.0405.
 fn strain_is_exact_at_large_strains<R: Float>() {
-    let spans = Spans::<R, 2>::new([1.0, 1.0], 1.0, 0.0, &Units::SI, SIX);
+    let mut m = Machine::news_8000();
+    m.idle[0].span_m = 1.0;
+    m.idle[1].span_m = 1.0;
+    let spans = Spans::<R, 2>::new(&One(&m, &Units::SI), SIX);
     for (v, expected) in [([1.0, 1.01], 0.0605), ([1.01, 1.0], 0.0396)] {
         // the first span keeps its 5 %: V_1 = 1.05·V_in
         let v_in = v[0] / 1.05;

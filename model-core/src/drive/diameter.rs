@@ -13,6 +13,9 @@ const RATE_MARGIN: f64 = 2.0;
 /// estimate that follows the swing takes it for diameter and hides it from the damping.
 const LAG_S: f64 = 1.0;
 
+/// The estimate without interlocks knows the roll's largest radius only so far.
+const BARE_LIMIT: f64 = 1.5;
+
 /// R̂ = V_rd/ω_uw with a lag and the interlocks of a drive.
 #[derive(Clone, Copy, Debug)]
 pub struct DiameterEstimator<R: Real> {
@@ -49,6 +52,17 @@ impl<R: Real> DiameterEstimator<R> {
     /// Takes over a preset, within spool and full roll.
     pub fn preset(&mut self, r: R) {
         self.r = R::Sum::at(r.clamp(self.spool, self.full));
+    }
+
+    /// One period as in the paper's simulator: the ratio as it comes, kept only from what no coefficient can be
+    /// computed with. At the start, while slack is taken up and at rest, the ratio is anything.
+    pub fn step_bare(&mut self, v_rd: R, omega_uw: R) {
+        if omega_uw == R::ZERO {
+            return;
+        }
+        let (low, high) = (self.spool, self.full * R::of(BARE_LIMIT));
+        let ratio = (v_rd / omega_uw).clamp(low, high);
+        self.r.add(self.share * (ratio - self.radius()));
     }
 
     /// One period. Held below the hold speed and while `hold`; falls only, no faster than caliper and speed

@@ -3,23 +3,29 @@
 //! Not here: modes and interlocks (the logic's), and everything a drive cannot measure: the regulators get
 //! [`Measurements`] and set-points, never the plant.
 
+pub mod autotune;
 pub mod diameter;
 pub mod drums;
 pub mod motor;
 pub mod pi;
 pub mod reference;
+pub mod table;
+pub mod tuning;
 pub mod unwind;
 
 use crate::exchange::{
-    Actuators, Brakes, BySection, DriveCommand, DriveStatus, Measurements, UnwindControl,
+    Actuators, Brakes, BySection, DriveCommand, DriveStatus, Loop, Measurements, Setting, TuneStep,
+    UnwindControl,
 };
 use crate::machine::Machine;
 use crate::real::Real;
+use autotune::{Axis, Found, Span, Tuner};
 use diameter::DiameterEstimator;
 use drums::{DrumTask, Drums};
-use motor::Motor;
+use motor::{Motor, Overload};
 use pi::Gains;
 use reference::SCurve;
+use tuning::Tuning;
 use unwind::{Unwind, UnwindTask};
 
 /// Period of the regulators' task, ms.
@@ -37,6 +43,7 @@ const TENSION_ROUNDING_S: f64 = 2.0;
 /// All regulators.
 #[derive(Clone, Copy, Debug)]
 pub struct Drive<R: Real> {
+    period: R,
     speed: SCurve<R>,
     tension: SCurve<R>,
     /// Largest rate of the tension reference, N/s, and its change, N/s².
@@ -45,6 +52,10 @@ pub struct Drive<R: Real> {
     unwind: Unwind<R>,
     drums: Drums<R>,
     motors: BySection<Motor<R>>,
+    overload: BySection<Overload<R>>,
+    tuner: Tuner<R>,
+    /// The tuning before auto-tune, as long as that is at work.
+    kept: Option<Tuning<R>>,
     /// Tension above which there is a web to measure a diameter by, N.
     web_present: R,
     /// The unwind's brake has been called to help.
@@ -56,38 +67,69 @@ impl<R: Real> Drive<R> {
     pub fn new(machine: &Machine) -> Self {
         let period = 1e-3 * f64::from(DRIVE_PERIOD_MS);
         let full = machine.operation.tension_n_m * machine.web.width_m;
-        let motors = &machine.motors;
+        let motor = |motor| Motor::new(motor, machine.motors.overload, period);
+        let motors = BySection {
+            uw: motor(&machine.motors.uw),
+            rd: motor(&machine.motors.rd),
+            fd: motor(&machine.motors.fd),
+            rr: motor(&machine.motors.rr),
+        };
+        let diameter = DiameterEstimator::new(machine, period);
+        let tuning = Tuning::new(machine, period);
         Self {
+            period: R::of(period),
             speed: SCurve::new(period),
             tension: SCurve::new(period),
             tension_rate: (
                 R::of(full / TENSION_RAMP_S),
                 R::of(full / TENSION_RAMP_S / TENSION_ROUNDING_S),
             ),
-            diameter: DiameterEstimator::new(machine, period),
-            unwind: Unwind::new(machine, period),
-            drums: Drums::new(machine, period),
-            motors: BySection {
-                uw: Motor::new(&motors.uw),
-                rd: Motor::new(&motors.rd),
-                fd: Motor::new(&motors.fd),
-                rr: Motor::new(&motors.rr),
-            },
+            diameter,
+            unwind: Unwind::new(
+                machine,
+                motors.uw,
+                &tuning.unwind,
+                diameter.radius(),
+                period,
+            ),
+            drums: Drums::new(machine, &motors, &tuning.drums, period),
+            motors,
+            overload: BySection::default(),
+            tuner: Tuner::new(machine, period),
+            kept: None,
             web_present: R::of(0.5 * full * machine.operation.stall_share),
             assisted: false,
         }
     }
 
-    /// One period: references, diameter, unwind, drums.
+    /// What the regulators know of their plant, and their gains.
+    pub fn tuning(&self) -> Tuning<R> {
+        Tuning {
+            drums: *self.drums.tuning(),
+            unwind: *self.unwind.tuning(),
+        }
+    }
+
+    /// Puts a tuning into use.
+    pub fn set_tuning(&mut self, tuning: &Tuning<R>) {
+        self.drums.tune(&tuning.drums);
+        self.unwind.tune(&tuning.unwind, self.diameter.radius());
+    }
+
+    /// One period: references, diameter, auto-tune, unwind, drums, motors.
     pub fn step(
         &mut self,
         command: &DriveCommand<R>,
         m: &Measurements<R>,
     ) -> (Actuators<R>, DriveStatus<R>) {
         let v = self.drums.speed(m);
-        self.follow_references(command, v);
+        let tuned = self.follow_autotune(command, m);
+        self.follow_references(command, v, tuned);
         self.estimate_diameter(command, m, v);
-        let torque = self.torques(command, m, v);
+        let limit = self.limits(command);
+        let torque = self.torques(command, m, v, limit, tuned);
+        self.end_autotune(m);
+        self.heat_motors(m, &torque);
         let assist = command.brake_assist && (self.assisted || self.unwind.at_limit());
         self.assisted = assist;
         let actuators = Actuators {
@@ -102,10 +144,11 @@ impl<R: Real> Drive<R> {
         (actuators, self.status(m, v, torque))
     }
 
-    fn follow_references(&mut self, command: &DriveCommand<R>, v: R) {
+    fn follow_references(&mut self, command: &DriveCommand<R>, v: R, tuned: Option<Loop>) {
         let (rate, jerk) = self.tension_rate;
         self.tension.step(command.tension, rate, jerk);
-        if !command.drums && command.unwind != UnwindControl::Speed {
+        let alone = command.unwind == UnwindControl::Speed;
+        if !(command.drums || alone) || tuned == Some(Loop::DrumSpeed) {
             self.speed.set(v);
         } else if !command.freeze_ramp {
             self.speed
@@ -117,43 +160,205 @@ impl<R: Real> Drive<R> {
         if let Some(r) = command.preset {
             self.diameter.preset(r);
         }
+        if command.bare_estimator {
+            self.diameter.step_bare(v, m.omega.uw);
+            return;
+        }
         let no_web = m.tension < self.web_present || command.unwind != UnwindControl::Tension;
         self.diameter
             .step(v, m.omega.uw, command.freeze_diameter || no_web);
     }
 
-    fn torques(&mut self, command: &DriveCommand<R>, m: &Measurements<R>, v: R) -> BySection<R> {
-        let (v_ref, a_ref) = (self.speed.value(), self.speed.rate());
-        let uw = self.unwind.step(
-            &UnwindTask {
+    /// Limits of torque, of rated torque: what is commanded, as far as the motors' overload goes.
+    fn limits(&self, command: &DriveCommand<R>) -> BySection<R> {
+        command
+            .torque_limit
+            .zip(self.motors.zip(self.overload))
+            .map(|(limit, (motor, overload))| limit.min(motor.allowed(&overload)))
+    }
+
+    fn heat_motors(&mut self, m: &Measurements<R>, torque: &BySection<R>) {
+        let (motors, o) = (&self.motors, &mut self.overload);
+        motors.uw.heat(&mut o.uw, torque.uw, m.omega.uw);
+        motors.rd.heat(&mut o.rd, torque.rd, m.omega.rd);
+        motors.fd.heat(&mut o.fd, torque.fd, m.omega.fd);
+        motors.rr.heat(&mut o.rr, torque.rr, m.omega.rr);
+    }
+
+    fn torques(
+        &mut self,
+        command: &DriveCommand<R>,
+        m: &Measurements<R>,
+        v: R,
+        limit: BySection<R>,
+        tuned: Option<Loop>,
+    ) -> BySection<R> {
+        let a_ref = if command.no_inertia_compensation {
+            R::ZERO
+        } else {
+            self.speed.rate()
+        };
+        let probe = match tuned {
+            Some(Loop::Tension) => self.tune_tension(command, m, v),
+            _ => None,
+        };
+        let uw = if tuned == Some(Loop::UnwindSpeed) {
+            self.tune_unwind(m, limit.uw)
+        } else {
+            let task = UnwindTask {
                 control: command.unwind,
-                v_ref,
+                v_ref: self.speed.value(),
                 a_ref,
                 tension_ref: self.tension.value(),
                 tension_rate: self.tension.rate(),
                 v,
                 r: self.diameter.radius(),
-                limit: command.torque_limit.uw,
-            },
-            m,
-        );
-        if !command.drums {
-            self.drums.off();
-            return BySection {
-                uw,
-                ..BySection::default()
+                limit: limit.uw,
+                probe,
             };
-        }
-        let task = DrumTask {
-            v_ref,
-            a_ref,
-            limit: command.torque_limit,
-            share_trim: command.front_share_trim,
+            self.unwind.step(&task, m)
         };
-        BySection {
-            uw,
-            ..self.drums.step(&task, m)
+        let windup = if tuned == Some(Loop::DrumSpeed) {
+            self.drums.off();
+            self.tune_drums(m, &limit)
+        } else if command.drums {
+            let task = DrumTask {
+                v_ref: self.speed.value(),
+                a_ref,
+                limit,
+                tension: (command.unwind == UnwindControl::Tension).then(|| self.tension.value()),
+                probe: probe.unwrap_or_default(),
+                share_trim: command.front_share_trim,
+            };
+            self.drums.step(&task, m)
+        } else {
+            self.drums.off();
+            BySection::default()
+        };
+        BySection { uw, ..windup }
+    }
+
+    fn follow_autotune(&mut self, command: &DriveCommand<R>, m: &Measurements<R>) -> Option<Loop> {
+        let tuned = self.tuner.follow(command.autotune)?;
+        if self.kept.is_none() {
+            self.kept = Some(self.tuning());
+            let old = self.setting(tuned, m);
+            self.tuner.report_mut().old = old;
         }
+        Some(tuned)
+    }
+
+    fn tune_unwind(&mut self, m: &Measurements<R>, limit: R) -> R {
+        let r = self.diameter.radius();
+        let tuning = *self.unwind.tuning();
+        let square = r * r;
+        let axis = Axis {
+            omega: m.omega.uw,
+            r,
+            limit: self.motors.uw.limit(m.omega.uw, limit),
+            rated: self.motors.uw.rated(),
+            inertia: tuning.inertia(r),
+            friction: tuning.friction * square,
+            braked: m.brakes.uw,
+            tension: m.tension,
+        };
+        let torque = self.tuner.drive(&axis, |inertia| {
+            let mass = inertia / square;
+            tuning.speed_gains(mass, tuning.mode(mass)).times(square)
+        });
+        self.unwind.stand_by(torque);
+        torque
+    }
+
+    fn tune_drums(&mut self, m: &Measurements<R>, limit: &BySection<R>) -> BySection<R> {
+        let r = self.drums.radius();
+        let tuning = *self.drums.tuning();
+        let square = r * r;
+        let axis = Axis {
+            omega: m.omega.rd,
+            r,
+            limit: self.drums.limit(limit, m) * r,
+            rated: self.drums.limit(&BySection::all(R::ONE), m) * r,
+            inertia: tuning.mass(m.d_wu) * square,
+            friction: tuning.friction * square,
+            braked: m.brakes.rd || m.brakes.fd,
+            tension: m.tension,
+        };
+        let torque = self
+            .tuner
+            .drive(&axis, |inertia| tuning.speed_gains(inertia));
+        self.drums.evenly(torque / r)
+    }
+
+    fn tune_tension(&mut self, command: &DriveCommand<R>, m: &Measurements<R>, v: R) -> Option<R> {
+        let tuning = self.unwind.tuning();
+        let r = self.diameter.radius();
+        self.tuner.watch(&Span {
+            tension: m.tension,
+            tension_ref: self.tension.value(),
+            v,
+            steady: self.speed.rate() == R::ZERO && self.tension.rate() == R::ZERO,
+            controlled: command.unwind == UnwindControl::Tension && command.drums,
+            stiffness: tuning.web_stiffness,
+            mass: tuning.inertia(r) / (r * r),
+            drum_mass: self.drums.tuning().mass(m.d_wu),
+        })
+    }
+
+    /// Takes over what auto-tune has found; an abort puts the old tuning back.
+    fn end_autotune(&mut self, m: &Measurements<R>) {
+        if let Some(found) = self.tuner.take_found() {
+            let tuning = self.tuning_with(&found, m);
+            self.set_tuning(&tuning);
+            if let Some(of) = self.tuner.report().of {
+                let new = self.setting(of, m);
+                self.tuner.report_mut().new = new;
+            }
+        }
+        match self.tuner.report().step {
+            TuneStep::Aborted => {
+                if let Some(tuning) = self.kept.take() {
+                    self.set_tuning(&tuning);
+                }
+            }
+            TuneStep::Done => self.kept = None,
+            _ => {}
+        }
+    }
+
+    fn tuning_with(&self, found: &Found<R>, m: &Measurements<R>) -> Tuning<R> {
+        let mut tuning = self.tuning();
+        match *found {
+            Found::Roll { inertia, friction } => {
+                if self.tuner.report().of == Some(Loop::UnwindSpeed) {
+                    let r = self.diameter.radius();
+                    tuning.unwind.learn(inertia, friction / (r * r), r);
+                } else {
+                    let square = self.drums.radius() * self.drums.radius();
+                    let (mass, friction) = (inertia / square, friction / square);
+                    tuning.drums.learn(mass, friction, m.d_wu);
+                }
+            }
+            Found::Web { stiffness, damping } => tuning.unwind.learn_web(stiffness, damping),
+        }
+        tuning
+    }
+
+    /// The setting of a loop at the present diameters.
+    fn setting(&self, of: Loop, m: &Measurements<R>) -> Setting<R> {
+        let gains = match of {
+            Loop::DrumSpeed => {
+                let (tuning, r) = (self.drums.tuning(), self.drums.radius());
+                tuning.speed_gains(tuning.mass(m.d_wu)).times(r * r)
+            }
+            Loop::UnwindSpeed => {
+                let (tuning, r) = (self.unwind.tuning(), self.diameter.radius());
+                let mass = tuning.inertia(r) / (r * r);
+                tuning.speed_gains(mass, tuning.mode(mass)).times(r * r)
+            }
+            Loop::Tension => self.unwind.tension_gains(),
+        };
+        gains.setting(self.period)
     }
 
     fn status(&self, m: &Measurements<R>, v: R, torque: BySection<R>) -> DriveStatus<R> {
@@ -168,6 +373,8 @@ impl<R: Real> Drive<R> {
             torque,
             load: torque.zip(self.motors).map(|(t, motor)| motor.load(t)),
             power: torque.zip(m.omega).map(|(t, omega)| t * omega),
+            overloaded: self.overload.map(|overload| overload.is_exhausted()),
+            autotune: *self.tuner.report(),
         }
     }
 }

@@ -1,6 +1,11 @@
 //! Motors with ideal torque regulators: shaft torque is the reference, within the motor's limits.
 //!
-//! Not here: overload in time, temperature, field weakening beyond constant power.
+//! Not here: temperatures in kelvin, field weakening beyond constant power.
+//!
+//! A motor may give more than its rated torque for a while. Its current i, of the rated one, heats it with i² and it
+//! gives off what the rated current heats, so that i² − 1 adds up; when a minute's worth at the overload is used up,
+//! the rated torque is the limit until all of it has been given off again. Below base speed i is the torque, above it
+//! the power. 150 % for 60 s is duty class II of IEC 60146-1-1.
 
 use crate::machine;
 use crate::real::Real;
@@ -11,15 +16,60 @@ pub struct Motor<R> {
     torque: R,
     power: R,
     per_torque: R,
+    per_power: R,
+    overload: R,
+    /// Share of the budget that 1 of i² − 1 uses up in a period.
+    heating: R,
+}
+
+/// How long a motor may take its overload, s.
+const OVERLOAD_S: f64 = 60.0;
+/// An overload so small that it needs no budget.
+const LEAST_OVERLOAD: f64 = 1e-3;
+
+/// How much of its overload a motor has used up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Overload<R> {
+    /// 0 rested, 1 used up.
+    used: R,
+    exhausted: bool,
 }
 
 impl<R: Real> Motor<R> {
-    /// From its description.
-    pub fn new(motor: &machine::Motor) -> Self {
+    /// From its description, its overload of rated torque, and the period, s.
+    pub fn new(motor: &machine::Motor, overload: f64, period: f64) -> Self {
+        let excess = (overload * overload - 1.0).max(LEAST_OVERLOAD);
         Self {
             torque: R::of(motor.torque_n_m),
             power: R::of(motor.power_w),
             per_torque: R::of(1.0 / motor.torque_n_m),
+            per_power: R::of(1.0 / motor.power_w),
+            overload: R::of(overload),
+            heating: R::of(period / (OVERLOAD_S * excess)),
+        }
+    }
+
+    /// What its overload allows at the moment, of rated torque.
+    pub fn allowed(&self, overload: &Overload<R>) -> R {
+        if overload.exhausted {
+            R::ONE
+        } else {
+            self.overload
+        }
+    }
+
+    /// One period of a torque at a speed.
+    pub fn heat(&self, overload: &mut Overload<R>, torque: R, omega: R) {
+        // above base speed the current goes with the power
+        let current = (torque * self.per_torque)
+            .abs()
+            .max((torque * omega * self.per_power).abs());
+        let rise = self.heating * (current * current - R::ONE);
+        overload.used = (overload.used + rise).clamp(R::ZERO, R::ONE);
+        if overload.used >= R::ONE {
+            overload.exhausted = true;
+        } else if overload.used <= R::ZERO {
+            overload.exhausted = false;
         }
     }
 
@@ -42,5 +92,17 @@ impl<R: Real> Motor<R> {
     /// A torque as share of the rated one.
     pub fn load(&self, torque: R) -> R {
         torque * self.per_torque
+    }
+}
+
+impl<R: Real> Overload<R> {
+    /// The motor is limited to its rated torque until it has recovered.
+    pub fn is_exhausted(&self) -> bool {
+        self.exhausted
+    }
+
+    /// Share that is used up, 0 to 1.
+    pub fn used(&self) -> R {
+        self.used
     }
 }

@@ -13,6 +13,16 @@ pub struct Gains<R> {
     pub integral: R,
 }
 
+impl<R: Real> Gains<R> {
+    /// Both gains times a factor.
+    pub fn times(&self, factor: R) -> Self {
+        Self {
+            proportional: self.proportional * factor,
+            integral: self.integral * factor,
+        }
+    }
+}
+
 /// The regulator's memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pi<R> {

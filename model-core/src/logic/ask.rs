@@ -4,7 +4,8 @@
 
 use super::{Logic, Mode, Sight, inject};
 use crate::exchange::{
-    Brakes, BySection, DriveCommand, Faults, MachineFaults, SensorFaults, Stuck, UnwindControl,
+    Brakes, BySection, DriveCommand, Faults, Loop, MachineFaults, SensorFaults, Stuck,
+    UnwindControl,
 };
 use crate::image;
 use crate::profidrive::stw1;
@@ -28,8 +29,8 @@ impl<R: Real> Logic<R> {
         let get = |signal| commands.get::<R>(signal);
         let percent = R::of(0.01);
         let drum_limit = get(&image::TORQUE_LIMIT_DRUMS) * percent;
-        let word = self.sections.rd.word();
         let tripped = self.faults.latched().tripped();
+        let defects = commands.word(&image::FAULT_DRIVES);
         let mut row = self.row(sight);
         if tripped.uw && row.unwind != UnwindControl::Off {
             (row.unwind, row.brakes.uw) = (UnwindControl::Off, true);
@@ -41,7 +42,7 @@ impl<R: Real> Logic<R> {
             v_target: row.v,
             acceleration: row.limits.0,
             jerk: row.limits.1,
-            freeze_ramp: word & stw1::UNFREEZE_RAMP == 0 && self.mode == Mode::Run,
+            freeze_ramp: false,
             tension: row.tension,
             preset: self.one_shot.preset,
             freeze_diameter: matches!(self.mode, Mode::WebBreakStop | Mode::UnwindManeuver),
@@ -61,6 +62,9 @@ impl<R: Real> Logic<R> {
             brakes: row.brakes,
             handling: self.one_shot.handling,
             faults: self.inject(sight),
+            autotune: (self.mode == Mode::AutoTune).then_some(self.tuned),
+            bare_estimator: defects & inject::BARE_ESTIMATOR != 0,
+            no_inertia_compensation: defects & inject::NO_INERTIA_COMPENSATION != 0,
         }
     }
 
@@ -80,10 +84,10 @@ impl<R: Real> Logic<R> {
         let word = self.sections.rd.word();
         let moving = |v| {
             let enabled = stw1::ENABLE_RAMP | stw1::ENABLE_SETPOINT;
-            if word & enabled == enabled {
-                v
-            } else {
+            if word & enabled != enabled {
                 R::ZERO
+            } else {
+                self.frozen.unwrap_or(v)
             }
         };
         // without web the unwind stands by its brake
@@ -127,7 +131,11 @@ impl<R: Real> Logic<R> {
                 };
                 (Speed, false, v, normal, zero, on(false, true))
             }
-            Mode::AutoTune => (pull, true, moving(crawl), normal, stall, open),
+            Mode::AutoTune => match self.tuned {
+                Loop::DrumSpeed => (Off, true, zero, normal, zero, on(true, false)),
+                Loop::UnwindSpeed => (Off, false, zero, normal, zero, on(false, true)),
+                Loop::Tension => (pull, true, moving(crawl), normal, stall, open),
+            },
         };
         Row {
             unwind,

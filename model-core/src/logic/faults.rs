@@ -183,6 +183,8 @@ pub struct Look {
     pub silent_rd: bool,
     /// The unwind's speed does not fit the web's.
     pub unwind_deviates: bool,
+    /// Motors that have used up their overload.
+    pub overloaded: BySection<bool>,
     /// The load cells show tension without web.
     pub load_cell_zero: bool,
 }
@@ -241,8 +243,17 @@ impl Faults {
                 self.warnings |= warning;
             }
         }
-        if look.load_cell_zero {
-            self.warnings |= warning::LOAD_CELL_ZERO;
+        let o = look.overloaded;
+        for (now, warning) in [
+            (look.load_cell_zero, warning::LOAD_CELL_ZERO),
+            (o.uw, warning::OVERLOAD_UW),
+            (o.rd, warning::OVERLOAD_RD),
+            (o.fd, warning::OVERLOAD_FD),
+            (o.rr, warning::OVERLOAD_RR),
+        ] {
+            if now {
+                self.warnings |= warning;
+            }
         }
         for (differs, watch, fault) in brakes {
             if !differs {
@@ -302,11 +313,12 @@ impl Faults {
 
     /// The sections with a warning.
     pub fn warned(&self) -> BySection<bool> {
+        let any = |bits| self.warnings & bits != 0;
         BySection {
-            uw: self.warnings & warning::HOT_UW != 0,
-            rd: self.warnings & warning::HOT_RD != 0,
-            fd: self.warnings & warning::HOT_FD != 0,
-            rr: self.warnings & warning::HOT_RR != 0,
+            uw: any(warning::HOT_UW | warning::OVERLOAD_UW),
+            rd: any(warning::HOT_RD | warning::OVERLOAD_RD),
+            fd: any(warning::HOT_FD | warning::OVERLOAD_FD),
+            rr: any(warning::HOT_RR | warning::OVERLOAD_RR),
         }
     }
 

@@ -29,10 +29,12 @@ mod words;
 pub use section::{Demand, Section, State};
 pub use words::{
     COMMAND_BITS, DRIVE_FAULT_BITS, Fault, LOOPS, MACHINE_FAULT_BITS, Mode, Refusal,
-    SENSOR_FAULT_BITS, STATUS_BITS, WARNING_BITS, command, inject, status, warning,
+    SENSOR_FAULT_BITS, STATUS_BITS, WARNING_BITS, WINDING_BITS, command, inject, status, warning,
 };
 
-use crate::exchange::{Brakes, BySection, DriveCommand, DriveStatus, Handling, Measurements};
+use crate::exchange::{
+    Brakes, BySection, DriveCommand, DriveStatus, Handling, Loop, Measurements, TuneStep,
+};
 use crate::image::{self, Commands, Feedback};
 use crate::machine::Machine;
 use crate::profidrive::stw1;
@@ -70,6 +72,9 @@ const ZERO_SPEED: f64 = 0.01;
 const SPEED_TOLERANCE: f64 = 0.005;
 /// Jerk of an emergency or web-break stop, m/s³.
 const EMERGENCY_JERK: f64 = 2.0;
+
+/// From asking the regulators for something to their status of it, drive cycles.
+const ASKED_CYCLES: u16 = 2;
 
 /// Requests that are done at once.
 const ACTS: [(u16, Cause); 6] = [
@@ -116,6 +121,11 @@ pub struct Logic<R> {
     jog: i8,
     /// It was commanded in the last cycle.
     jogged: bool,
+    /// The loop that auto-tune tunes, and the cycles since it was asked for.
+    tuned: Loop,
+    tuning_cycles: u16,
+    /// Speed at which the frozen ramp comes to rest.
+    frozen: Option<R>,
     /// Brakes as they were asked for in the last cycle.
     asked: Brakes<bool>,
     one_shot: OneShot<R>,
@@ -210,6 +220,9 @@ impl<R: Real> Logic<R> {
             drums_held: false,
             jog: 0,
             jogged: false,
+            tuned: Loop::DrumSpeed,
+            tuning_cycles: 0,
+            frozen: None,
             asked: Brakes::default(),
             one_shot: OneShot::default(),
             answer: Feedback::default(),
@@ -246,6 +259,7 @@ impl<R: Real> Logic<R> {
         self.obey_requests(&sight);
         self.withdraw(&sight);
         self.go_on(&sight);
+        self.freeze_ramp(&sight);
         self.last_command = commands.word(&image::WINDER_COMMAND);
         self.jogged = sight.jog != Some(0);
         let mut answer = self.answer;
@@ -365,13 +379,15 @@ impl<R: Real> Logic<R> {
     fn detect(&mut self, sight: &Sight<R>) {
         let (c, m) = (&self.c, sight.m);
         let stall = sight.commands.get::<R>(&image::STALL_SET) * c.width;
+        // a break at crawl is found in the cycle in which tension would no longer be detected
+        let held = self.holds_tension();
         self.tension
             .step(m.tension > c.detected * stall, TENSION_CYCLES);
         let now = self.tension_now.step(m.tension);
         let look = self.look(sight);
         self.faults.watch(&look, &self.patience);
 
-        let lost = self.holds_tension() && now < c.lost * sight.drive.tension_ref;
+        let lost = held && now < c.lost * sight.drive.tension_ref;
         let patience = if sight.drive.v.abs() > c.web_break_speed {
             WEB_BREAK_CYCLES
         } else {
@@ -411,6 +427,7 @@ impl<R: Real> Logic<R> {
             },
             silent_uw: m.omega.uw == R::ZERO && !m.brakes.uw && (jogs || holds && turns(d.v)),
             silent_rd: m.omega.rd == R::ZERO && turns(m.omega.fd * c.r_fd),
+            overloaded: d.overloaded,
             unwind_deviates: holds && fast && (d.v_uw - d.v).abs() > c.deviation * d.v.abs(),
             load_cell_zero: !self.web_threaded && m.tension.abs() > c.load_cell_zero,
         }
@@ -510,9 +527,9 @@ impl<R: Real> Logic<R> {
     }
 
     fn tune_cause(&self, sight: &Sight<R>) -> Cause {
-        match sight.commands.word(&image::AUTOTUNE_LOOP) {
-            0 | 1 => Cause::TuneSpeed,
-            _ => Cause::TuneTension,
+        match loop_to_tune(sight.commands) {
+            Loop::DrumSpeed | Loop::UnwindSpeed => Cause::TuneSpeed,
+            Loop::Tension => Cause::TuneTension,
         }
     }
 
@@ -569,6 +586,9 @@ impl<R: Real> Logic<R> {
                 handling.thread_web = true;
                 self.web_threaded = true;
             }
+            Cause::TuneSpeed | Cause::TuneTension => {
+                (self.tuned, self.tuning_cycles) = (loop_to_tune(sight.commands), 0);
+            }
             _ => {}
         }
         Ok(())
@@ -592,8 +612,36 @@ impl<R: Real> Logic<R> {
         Ok(())
     }
 
+    /// Auto-tune ends when the regulators say so, of the tune that was asked for and not of the last one.
+    fn follow_tuning(&mut self, sight: &Sight<R>) {
+        self.tuning_cycles = self.tuning_cycles.saturating_add(1);
+        let ended = matches!(
+            sight.drive.autotune.step,
+            TuneStep::Done | TuneStep::Aborted
+        );
+        if ended && self.tuning_cycles > ASKED_CYCLES {
+            self.take(Cause::TuneEnds);
+        }
+    }
+
+    /// While the ramp generator is frozen the speed stays where its acceleration can be rounded off: v + a·|a|/2j.
+    fn freeze_ramp(&mut self, sight: &Sight<R>) {
+        let frozen = self.sections.rd.word() & stw1::UNFREEZE_RAMP == 0;
+        if !frozen || !matches!(self.mode, Mode::Thread | Mode::Run) {
+            self.frozen = None;
+        } else if self.frozen.is_none() {
+            let (v, a) = (sight.drive.v_ref, sight.drive.a_ref);
+            let jerk: R = sight.commands.get(&image::JERK_SET);
+            let rest = v + a * a.abs() / (jerk + jerk);
+            self.frozen = Some(rest.clamp(R::ZERO, self.c.max_speed));
+        }
+    }
+
     /// Modes that end by themselves.
     fn go_on(&mut self, sight: &Sight<R>) {
+        if self.mode == Mode::AutoTune {
+            self.follow_tuning(sight);
+        }
         let ends = match self.mode {
             // what follows has a gentler jerk, which could not end the ramp in time
             Mode::WebBreakStop => sight.drive.a_ref == R::ZERO,
@@ -614,6 +662,14 @@ impl<R: Real> Logic<R> {
         } else {
             Cause::StandsSlack
         });
+    }
+}
+
+fn loop_to_tune(commands: &Commands) -> Loop {
+    match commands.word(&image::AUTOTUNE_LOOP) {
+        0 => Loop::DrumSpeed,
+        1 => Loop::UnwindSpeed,
+        _ => Loop::Tension,
     }
 }
 

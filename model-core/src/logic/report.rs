@@ -65,6 +65,18 @@ impl<R: Real> Logic<R> {
         let pulses = m.pulses_rd.wrapping_sub(self.pulses_at_core);
         f.set(&image::LENGTH_WU, f64::from(pulses) * c.metres_per_pulse);
         f.set_double(&image::PULSES_RD, m.pulses_rd);
+
+        let tune = &d.autotune;
+        f.set_word(&image::AUTOTUNE_STEP, tune.step.number().into());
+        f.set(&image::AUTOTUNE_PROGRESS, tune.progress);
+        f.set_word(&image::AUTOTUNE_ABORT, tune.abort.number().into());
+        f.set(&image::AUTOTUNE_INERTIA, tune.inertia);
+        f.set(&image::AUTOTUNE_FRICTION, tune.friction);
+        f.set(&image::AUTOTUNE_STIFFNESS, tune.stiffness);
+        f.set(&image::AUTOTUNE_GAIN_OLD, tune.old.gain);
+        f.set(&image::AUTOTUNE_GAIN_NEW, tune.new.gain);
+        f.set(&image::AUTOTUNE_TIME_OLD, tune.old.time);
+        f.set(&image::AUTOTUNE_TIME_NEW, tune.new.time);
     }
 
     fn status(&self, sight: &Sight<R>, at_speed: bool) -> u16 {

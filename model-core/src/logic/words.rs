@@ -243,6 +243,14 @@ pub mod warning {
     pub const HOT_RR: u16 = 1 << 3;
     /// The load cells show tension and there is no web.
     pub const LOAD_CELL_ZERO: u16 = 1 << 4;
+    /// The unwind's motor has used up its overload.
+    pub const OVERLOAD_UW: u16 = 1 << 5;
+    /// The rear drum's motor has used up its overload.
+    pub const OVERLOAD_RD: u16 = 1 << 6;
+    /// The front drum's motor has used up its overload.
+    pub const OVERLOAD_FD: u16 = 1 << 7;
+    /// The rider roll's motor has used up its overload.
+    pub const OVERLOAD_RR: u16 = 1 << 8;
 }
 
 /// The bits of the word of warnings by name.
@@ -255,6 +263,26 @@ pub const WARNING_BITS: &[Bit] = &[
         4,
         "load_cell_zero",
         "the load cells show tension and there is no web",
+    ),
+    Bit::new(
+        5,
+        "overload_uw",
+        "the unwind's motor has used up its overload: rated torque only",
+    ),
+    Bit::new(
+        6,
+        "overload_rd",
+        "the rear drum's motor has used up its overload: rated torque only",
+    ),
+    Bit::new(
+        7,
+        "overload_fd",
+        "the front drum's motor has used up its overload: rated torque only",
+    ),
+    Bit::new(
+        8,
+        "overload_rr",
+        "the rider roll's motor has used up its overload: rated torque only",
     ),
 ];
 
@@ -356,6 +384,18 @@ pub const DRIVE_FAULT_BITS: &[Bit] = &[
         10,
         "bus_silent",
         "nothing passes between the PLC and the drives",
+    ),
+];
+
+/// The bits of the word on the winding by name.
+pub const WINDING_BITS: &[Bit] = &[
+    Bit::new(0, "slides_rd", "the rear drum slides on the shipping roll"),
+    Bit::new(1, "slides_fd", "the front drum slides on the shipping roll"),
+    Bit::new(2, "slides_rr", "the rider roll slides on the shipping roll"),
+    Bit::new(
+        3,
+        "burst",
+        "the wound-on tension was above the web's strength",
     ),
 ];
 

@@ -15,6 +15,8 @@ use heapless::Vec;
 pub const MAX_SPANS: usize = 8;
 /// The most points in the table of the rider roll's load.
 pub const MAX_RIDER_LOADS: usize = 16;
+/// The most points in the table of the front drum's share.
+pub const MAX_FRONT_SHARES: usize = 8;
 
 /// The web.
 #[derive(Clone, Debug, PartialEq)]
@@ -204,6 +206,15 @@ pub struct Brakes {
     pub karnopp_m_s: f64,
 }
 
+/// Front drum's share of the drums' force at one diameter of the shipping roll.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrontShare {
+    /// Diameter of the shipping roll, m.
+    pub diameter_m: f64,
+    /// Share of the force of both drums.
+    pub share: f64,
+}
+
 /// How the machine is run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Operation {
@@ -223,8 +234,10 @@ pub struct Operation {
     pub tension_n_m: f64,
     /// Tension at standstill, of the web tension.
     pub stall_share: f64,
-    /// Front drum's share of the drum torque at the core and at the full roll.
-    pub front_share: [f64; 2],
+    /// Front drum's share of the drums' force over the diameter of the shipping roll, linear between the points.
+    pub front_share: Vec<FrontShare, MAX_FRONT_SHARES>,
+    /// Rider roll's share of the winding force.
+    pub rider_share: f64,
 }
 
 impl IdleRoll {
@@ -290,6 +303,13 @@ impl Machine {
         let core = self.shipping_roll.core_radius_m;
         let roll = self.web.roll_inertia(r_wu) - self.web.roll_inertia(core);
         rolls.iter().map(|roll| roll.mass_kg()).sum::<f64>() + roll / (r_wu * r_wu)
+    }
+
+    /// Length of span `i`, m: those that lead to the idle rolls, and the last.
+    pub fn span_m(&self, i: usize) -> f64 {
+        self.idle
+            .get(i)
+            .map_or(self.last_span_m, |roll| roll.span_m)
     }
 
     /// Length of the web from the unwind to the rear drum, m.

@@ -13,7 +13,7 @@ use core::ops::RangeInclusive;
 
 use heapless::Vec;
 
-use super::{MAX_BRAKE_DELAY_S, MAX_RIDER_LOADS, MAX_SPANS, Machine};
+use super::{MAX_BRAKE_DELAY_S, MAX_FRONT_SHARES, MAX_RIDER_LOADS, MAX_SPANS, Machine};
 
 /// What a parameter can be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -284,13 +284,12 @@ macro_rules! motor {
 }
 
 macro_rules! front_share {
-    ($index:literal, $about:literal) => {
-        parameter! {
-            concat!("operation.front_share[", $index, "]"), $index, "", $about;
-            |_m, _i| 0.0..=1.0;
-            |m, i| *m.operation.front_share.get(i)?;
-            |m, i| *m.operation.front_share.get_mut(i)?
-        }
+    ($index:literal) => {
+        part!(|m, i| (operation.front_share[$index]) {
+            diameter_m "m", i.checked_sub(1).map_or(0.0, |i| m.operation.front_share[i].diameter_m)..=5.0,
+                "diameter of the shipping roll";
+            share "", 0.0..=1.0, "front drum's share of the force of both drums";
+        })
     };
 }
 
@@ -421,11 +420,22 @@ static TABLE: &[&[Parameter]] = &[
         emergency_m_s2 "m/s²", m.operation.acceleration_m_s2..=10.0, "deceleration of an emergency stop";
         tension_n_m "N/m", 1.0..=0.5 * m.web.strength_n_m, "web tension per width";
         stall_share "", 0.05..=1.0, "tension at standstill, of the web tension";
+        rider_share "", 0.0..=0.5, "rider roll's share of the winding force";
     }),
-    &[
-        front_share!(0, "front drum's share of the drum torque at the core"),
-        front_share!(1, "front drum's share of the drum torque at the full roll"),
-    ],
+    length!(
+        "operation.front_share (number of points)",
+        MAX_FRONT_SHARES,
+        "front drum's share of the drums' force over the diameter of the shipping roll, linear between the points",
+        operation.front_share
+    ),
+    front_share!(0),
+    front_share!(1),
+    front_share!(2),
+    front_share!(3),
+    front_share!(4),
+    front_share!(5),
+    front_share!(6),
+    front_share!(7),
     part!(|m, i| () {
         encoder_pulses "", 1.0..=1e5, "pulses of the rear drum's encoder for one revolution";
     }),

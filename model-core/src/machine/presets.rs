@@ -28,6 +28,12 @@ fn rider_load<const N: usize>(points: [(f64, f64); N]) -> Vec<RiderLoad, MAX_RID
     points.into_iter().map(point).collect()
 }
 
+/// The front drum's share by diameter, m.
+fn front_share<const N: usize>(points: [(f64, f64); N]) -> Vec<FrontShare, MAX_FRONT_SHARES> {
+    let point = |(diameter_m, share)| FrontShare { diameter_m, share };
+    points.into_iter().map(point).collect()
+}
+
 impl Machine {
     /// The preset of a name, in capitals or not.
     pub fn preset(name: &str) -> Option<Self> {
@@ -162,7 +168,8 @@ impl Machine {
                 emergency_m_s2: 1.0,
                 tension_n_m: 350.0,
                 stall_share: 0.30,
-                front_share: [0.60, 0.52],
+                front_share: front_share([(0.10, 0.60), (1.25, 0.52)]),
+                rider_share: 0.05,
             },
             encoder_pulses: 4096.0,
         }
@@ -343,7 +350,8 @@ impl Machine {
                 emergency_m_s2: 1.0,
                 tension_n_m: 250.0,
                 stall_share: 0.30,
-                front_share: [0.60, 0.52],
+                front_share: front_share([(0.076, 0.60), (0.20, 0.52)]),
+                rider_share: 0.05,
             },
             encoder_pulses: 4096.0,
             ..news

@@ -30,7 +30,7 @@ use nip::Nips;
 use rk4::State;
 use sensors::{Sensors, Sight};
 use span::Web;
-use units::Units;
+use units::{One, Units};
 use windup::{FRONT, Nip, Parts, ROLLS, Speeds, Whole};
 
 /// Period of the plant task and longest step of its integration, ms.
@@ -57,6 +57,8 @@ pub struct Winder<R: Scalar, const SPANS: usize> {
     web: Web<R, SPANS>,
     /// The web is led through the machine and whole.
     threaded: bool,
+    /// The span in which it has parted last, counted from the unwind; 0 while it is whole.
+    broken_span: u8,
     delay: Brakes<Delay>,
     closed: Brakes<bool>,
     nips: [Nip<R::Si>; ROLLS],
@@ -147,7 +149,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let limits = Limits::new(machine, &units);
         let zero = R::Sum::at(R::ZERO);
         Ok(Self {
-            motion: Motion::new(machine, &units, step),
+            motion: Motion::new(&One(machine, &units), step),
             holders: Holders::new(machine, step),
             scale: Scale::new(&units),
             substeps,
@@ -164,6 +166,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             apart: [zero; ROLLS],
             web: Web::none(),
             threaded: false,
+            broken_span: 0,
             delay: Brakes::all(Delay::new(machine.brakes.delay_s, h)),
             closed: Brakes::default(),
             nips: [Nip::Sticks; ROLLS],
@@ -210,6 +213,17 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         self.threaded = false;
         self.state.strain = [R::Sum::at(R::ZERO); SPANS];
         self.web = Web::none();
+    }
+
+    /// The same in the span of an index.
+    fn break_web_in(&mut self, span: usize) {
+        self.break_web();
+        self.broken_span = (span.min(SPANS - 1) + 1) as u8;
+    }
+
+    /// The span in which the web has parted, counted from the unwind; 0 while it is whole, or taken out.
+    pub fn broken_span(&self) -> u8 {
+        self.broken_span
     }
 
     /// The state variables in SI: ground truth, for records and tests.
@@ -282,8 +296,11 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let strain = limits.threaded_strain;
         if handling.remove_web {
             self.break_web();
+            self.broken_span = 0;
         }
         if handling.thread_web && !self.threaded {
+            // whoever leads the web over idle rolls stops them
+            self.state.v[..SPANS - 1].fill(R::Sum::at(R::ZERO));
             self.thread_with(strain);
         }
         self.suffer(&actuators.faults.machine);
@@ -294,8 +311,10 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         if faults.parent_roll_expired {
             self.state.r_uw = R::Sum::at(self.limits.expire_radius);
         }
-        if faults.web_break > 0 && self.threaded {
-            self.break_web();
+        if let Some(span) = faults.web_break.checked_sub(1)
+            && self.threaded
+        {
+            self.break_web_in(span.into());
         }
         // drums once worn may slip from then on; a nip that sticks computes what a whole windup does
         if self.holders.nips.wear(faults.drum_wear) && !self.holders.slips {
@@ -307,6 +326,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
 
     fn thread_with(&mut self, strain: R) {
         self.threaded = true;
+        self.broken_span = 0;
         self.state.strain = [R::Sum::at(strain); SPANS];
         self.look_at_web(&None);
     }
@@ -515,14 +535,15 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let limits = &self.limits;
         // what is not a number holds nothing
         let holds = |t: &R| *t <= limits.strength;
-        let torn = !self.web.tension.iter().all(holds);
+        let torn = self.web.tension.iter().position(|t| !holds(t));
         let expired = self.state.r_uw.value() <= limits.expire_radius;
         let pulled_off = self.state.r_wu.value() < limits.bare_radius;
         if pulled_off {
             self.state.r_wu = R::Sum::at(limits.core_radius);
         }
-        if self.threaded && (torn || expired || pulled_off) {
-            self.break_web();
+        if self.threaded && (torn.is_some() || expired || pulled_off) {
+            let first = if expired { 0 } else { SPANS - 1 };
+            self.break_web_in(torn.unwrap_or(first));
         }
     }
 

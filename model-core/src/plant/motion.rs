@@ -8,10 +8,9 @@ use super::eccentricity::Offsets;
 use super::rk4::{self, State};
 use super::roll::{Idle, Unwind};
 use super::span::{Spans, Web};
-use super::units::Units;
+use super::units::Machines;
 use super::windup::{self, Windup};
-use crate::machine::Machine;
-use crate::real::{Accumulator, Arithmetic, Scalar};
+use crate::real::{Accumulator, Arithmetic};
 
 /// The coefficients of all that moves.
 #[derive(Clone, Debug)]
@@ -52,27 +51,17 @@ impl<A: Copy, const SPANS: usize> Load<A, (), SPANS> {
     }
 }
 
-impl<R: Scalar, const SPANS: usize> Motion<R, SPANS> {
-    /// From the machine's description, for steps of `h` seconds.
-    pub fn new(machine: &Machine, units: &Units, h: f64) -> Self {
-        let roll = |i: usize| machine.idle.get(i);
-        let web = &machine.web;
+impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
+    /// From the description of machines with `SPANS` spans, for steps of `h` seconds.
+    pub fn new(machines: &impl Machines<A>, h: f64) -> Self {
         Self {
-            spans: Spans::new(
-                core::array::from_fn(|i| roll(i).map_or(machine.last_span_m, |r| r.span_m)),
-                web.stiffness_n_m * web.width_m,
-                web.retardation_s,
-                units,
-                h,
-            ),
-            idle: core::array::from_fn(|i| roll(i).map(|roll| Idle::new(roll, units, h))),
-            unwind: Unwind::new(machine, units, h),
-            windup: Windup::new(machine, units, h),
+            spans: Spans::new(machines, h),
+            idle: core::array::from_fn(|i| (i + 1 < SPANS).then(|| Idle::new(machines, i, h))),
+            unwind: Unwind::new(machines, h),
+            windup: Windup::new(machines, h),
         }
     }
-}
 
-impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
     /// Strain rates and tensions of the web in a state.
     #[inline(always)]
     pub fn web<const APART: usize>(

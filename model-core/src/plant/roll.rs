@@ -2,9 +2,9 @@
 //!
 //! Not here: bending, eccentricity, slip between web and roll.
 
-use super::units::Units;
-use crate::machine::{IdleRoll, Machine};
-use crate::real::{Arithmetic, Scalar};
+use super::units::Machines;
+use crate::machine::Machine;
+use crate::real::Arithmetic;
 
 /// An idle roll, or several of one radius, by its mass at the surface.
 #[derive(Clone, Copy, Debug)]
@@ -15,18 +15,15 @@ pub struct Idle<A: Arithmetic> {
     friction: A,
 }
 
-impl<R: Scalar> Idle<R> {
-    /// From its description, for steps of `h` seconds.
-    pub fn new(roll: &IdleRoll, units: &Units, h: f64) -> Self {
-        let mass = roll.mass_kg() * units.speed / units.force;
+impl<A: Arithmetic> Idle<A> {
+    /// Idle roll `i` of the machines, which must have it, for steps of `h` seconds.
+    pub fn new(machines: &impl Machines<A>, i: usize, h: f64) -> Self {
         Self {
-            per_mass: R::gain(h / 6.0 / mass),
-            friction: R::coefficient(roll.friction_n_s_m * units.speed / units.force),
+            per_mass: machines.gain(|m, u| h / 6.0 * u.force / (m.idle[i].mass_kg() * u.speed)),
+            friction: machines.coefficient(|m, u| m.idle[i].friction_n_s_m * u.speed / u.force),
         }
     }
-}
 
-impl<A: Arithmetic> Idle<A> {
     /// (J/R²)·V̇ = t_down − t_up − c·V
     #[inline(always)]
     pub fn acceleration(&self, v: A, t_up: A, t_down: A) -> A::Rate {
@@ -49,27 +46,23 @@ pub struct Unwind<A: Arithmetic> {
     layer: A::Gain,
 }
 
-impl<R: Scalar> Unwind<R> {
-    /// From the machine's description, for steps of `h` seconds.
-    pub fn new(machine: &Machine, units: &Units, h: f64) -> Self {
+impl<A: Arithmetic> Unwind<A> {
+    /// From the machines' description, for steps of `h` seconds.
+    pub fn new(machines: &impl Machines<A>, h: f64) -> Self {
         let sixth = h / 6.0;
-        let square = units.r_uw * units.r_uw;
-        let layer = machine.web.caliper_m / core::f64::consts::TAU;
+        let layer = |m: &Machine| m.web.caliper_m / core::f64::consts::TAU;
         Self {
-            inertia_factor: R::coefficient(
-                machine.web.inertia_factor() * (square * square) / units.inertia,
-            ),
-            inertia_offset: R::coefficient(machine.parent_roll_offset() / units.inertia),
-            friction: R::coefficient(
-                machine.parent_roll.friction_n_s_m * units.speed / units.force,
-            ),
-            per_inertia: R::gain(sixth * units.torque() / (units.inertia * units.omega())),
-            layer: R::gain(-(sixth * layer * units.omega() / units.r_uw)),
+            inertia_factor: machines.coefficient(|m, u| {
+                let square = u.r_uw * u.r_uw;
+                m.web.inertia_factor() * (square * square) / u.inertia
+            }),
+            inertia_offset: machines.coefficient(|m, u| m.parent_roll_offset() / u.inertia),
+            friction: machines.coefficient(|m, u| m.parent_roll.friction_n_s_m * u.speed / u.force),
+            per_inertia: machines.gain(|_, u| sixth * u.torque() / (u.inertia * u.omega())),
+            layer: machines.gain(|m, u| -(sixth * layer(m) * u.omega() / u.r_uw)),
         }
     }
-}
 
-impl<A: Arithmetic> Unwind<A> {
     /// J(R) = J_0 + ½·π·ρ·W·(R⁴ − R_spool⁴), kg·m²
     #[inline(always)]
     pub fn inertia(&self, r: A) -> A {

@@ -2,8 +2,9 @@
 //!
 //! Not here: out-of-plane motion, wrinkles, temperature, moisture. Strain is uniform along a span.
 
-use super::units::Units;
-use crate::real::{Arithmetic, Scalar};
+use super::units::Machines;
+use crate::machine::Machine;
+use crate::real::Arithmetic;
 
 /// The coefficients of all spans, which carry the same web.
 #[derive(Clone, Copy, Debug)]
@@ -36,25 +37,22 @@ impl<A: Arithmetic, const SPANS: usize> Web<A, SPANS> {
     }
 }
 
-impl<R: Scalar, const SPANS: usize> Spans<R, SPANS> {
-    /// From lengths in m, EA in N and the retardation time in s, for steps of `h` seconds.
-    pub fn new(
-        lengths: [f64; SPANS],
-        stiffness_n: f64,
-        retardation_s: f64,
-        units: &Units,
-        h: f64,
-    ) -> Self {
-        let viscosity = stiffness_n * retardation_s * units.speed / units.force;
+impl<A: Arithmetic, const SPANS: usize> Spans<A, SPANS> {
+    /// From the machines' description, for steps of `h` seconds.
+    pub fn new(machines: &impl Machines<A>, h: f64) -> Self {
+        let stiffness = |m: &Machine| m.web.stiffness_n_m * m.web.width_m;
         Self {
-            per_length: lengths.map(|l| R::gain(h / 6.0 * units.speed / (l * units.strain))),
-            stiffness: R::coefficient(stiffness_n * units.strain / units.force),
-            viscosity: lengths.map(|l| R::coefficient(viscosity / l)),
+            per_length: core::array::from_fn(|i| {
+                machines.gain(|m, u| h / 6.0 * u.speed / (m.span_m(i) * u.strain))
+            }),
+            stiffness: machines.coefficient(|m, u| stiffness(m) * u.strain / u.force),
+            viscosity: core::array::from_fn(|i| {
+                let viscosity = |m: &Machine| stiffness(m) * m.web.retardation_s / m.span_m(i);
+                machines.coefficient(|m, u| viscosity(m) * u.speed / u.force)
+            }),
         }
     }
-}
 
-impl<A: Arithmetic, const SPANS: usize> Spans<A, SPANS> {
     /// The strain at which a span carries the tension, at rest.
     pub fn strain_of(&self, tension: A) -> A {
         tension.over(self.stiffness)

@@ -7,7 +7,7 @@
 //! equations are the same; their coefficients take the units in, once, when they are made.
 
 use crate::machine::{Machine, MachineError};
-use crate::real::Scalar;
+use crate::real::{Arithmetic, Scalar};
 
 /// Units over the largest regular value of the speed, so that an overspeed can be held.
 const SPEED_RESERVE: f64 = 1.25;
@@ -33,6 +33,26 @@ pub struct Units {
     pub mass: f64,
     /// Of the way in a step, m.
     pub travel: f64,
+}
+
+/// Where the coefficients of a motion come from: one machine, or several side by side.
+pub trait Machines<A: Arithmetic> {
+    /// A coefficient of each machine, given its units.
+    fn coefficient(&self, of: impl Fn(&Machine, &Units) -> f64) -> A;
+    /// A factor from a quantity to a change, likewise.
+    fn gain(&self, of: impl Fn(&Machine, &Units) -> f64) -> A::Gain;
+}
+
+/// One machine with its units.
+pub struct One<'a>(pub &'a Machine, pub &'a Units);
+
+impl<R: Scalar> Machines<R> for One<'_> {
+    fn coefficient(&self, of: impl Fn(&Machine, &Units) -> f64) -> R {
+        R::coefficient(of(self.0, self.1))
+    }
+    fn gain(&self, of: impl Fn(&Machine, &Units) -> f64) -> R::Gain {
+        R::gain(of(self.0, self.1))
+    }
 }
 
 impl Units {

@@ -6,9 +6,9 @@
 //! roll or slides on it and pulls it with a force that is held over the step. What sticks together is one body: its
 //! forces and masses add up.
 
-use super::units::Units;
-use crate::machine::Machine;
-use crate::real::{Arithmetic, Scalar};
+use super::units::Machines;
+use crate::machine::{DrivenRoll, Machine};
+use crate::real::Arithmetic;
 
 /// The rolls that touch the shipping roll, in this order everywhere: rear drum, front drum, rider roll.
 pub const ROLLS: usize = 3;
@@ -19,6 +19,15 @@ pub const FRONT: usize = 1;
 
 /// Mass that a core has at least when nothing sticks to it, kg: a shipping roll without paper has none in {15}.
 pub const LEAST_MASS: f64 = 5.0;
+
+/// The rolls in their order.
+fn roll(machine: &Machine, j: usize) -> &DrivenRoll {
+    [&machine.rear_drum, &machine.front_drum, &machine.rider_roll][j]
+}
+
+fn each<T>(of: impl Fn(usize) -> T) -> [T; ROLLS] {
+    core::array::from_fn(of)
+}
 
 /// Coefficients of the windup.
 #[derive(Clone, Copy, Debug)]
@@ -115,36 +124,40 @@ pub enum Nip<T> {
     Slides(T),
 }
 
-impl<R: Scalar> Windup<R> {
-    /// From the machine's description, for steps of `h` seconds.
-    pub fn new(machine: &Machine, units: &Units, h: f64) -> Self {
-        let rolls = [&machine.rear_drum, &machine.front_drum, &machine.rider_roll];
-        let roll = &machine.shipping_roll;
+impl<A: Arithmetic> Windup<A> {
+    /// From the machines' description, for steps of `h` seconds.
+    pub fn new(machines: &impl Machines<A>, h: f64) -> Self {
         let sixth = h / 6.0;
-        let friction = |c: f64| R::coefficient(c * units.speed / units.force);
-        let frictions = rolls.map(|roll| roll.friction_n_s_m);
-        let layer = machine.web.caliper_m / core::f64::consts::TAU;
-        let factor = machine.web.inertia_factor();
-        let accelerate = sixth * units.force / units.speed;
+        let friction =
+            |c: fn(&Machine) -> f64| machines.coefficient(move |m, u| c(m) * u.speed / u.force);
+        let layer = |m: &Machine| m.web.caliper_m / core::f64::consts::TAU;
+        let growth = |m: &Machine| m.web.inertia_factor() * layer(m);
+        let core = |m: &Machine| m.shipping_roll.core_radius_m;
         Self {
-            mass: rolls.map(|roll| R::coefficient(roll.mass_kg() / units.mass)),
-            drum_mass: R::coefficient(machine.windup_mass_kg(roll.core_radius_m) / units.mass),
-            least_mass: R::coefficient(LEAST_MASS / units.mass),
-            friction: frictions.map(friction),
-            all_friction: friction(frictions.iter().sum::<f64>() + roll.friction_n_s_m),
-            resistance: friction(roll.friction_n_s_m),
-            inertia_factor: R::coefficient(factor * units.r_wu * units.r_wu / units.mass),
-            core: R::coefficient(roll.core_radius_m / units.r_wu),
-            growth: R::coefficient(factor * layer * units.speed * units.speed / units.force),
-            layer: R::gain(sixth * layer * units.speed / (roll.core_radius_m * units.r_wu)),
-            per_mass: R::gain(accelerate / units.mass),
-            per_roll: rolls.map(|roll| R::gain(accelerate / roll.mass_kg())),
-            way: R::gain(sixth * units.speed / units.travel),
+            mass: each(|j| machines.coefficient(|m, u| roll(m, j).mass_kg() / u.mass)),
+            drum_mass: machines.coefficient(|m, u| m.windup_mass_kg(core(m)) / u.mass),
+            least_mass: machines.coefficient(|_, u| LEAST_MASS / u.mass),
+            friction: each(|j| {
+                machines.coefficient(|m, u| roll(m, j).friction_n_s_m * u.speed / u.force)
+            }),
+            all_friction: friction(|m| {
+                let rolls = (0..ROLLS).map(|j| roll(m, j).friction_n_s_m);
+                rolls.sum::<f64>() + m.shipping_roll.friction_n_s_m
+            }),
+            resistance: friction(|m| m.shipping_roll.friction_n_s_m),
+            inertia_factor: machines
+                .coefficient(|m, u| m.web.inertia_factor() * u.r_wu * u.r_wu / u.mass),
+            core: machines.coefficient(|m, u| core(m) / u.r_wu),
+            growth: machines.coefficient(|m, u| growth(m) * u.speed * u.speed / u.force),
+            layer: machines.gain(|m, u| sixth * layer(m) * u.speed / (core(m) * u.r_wu)),
+            per_mass: machines.gain(|_, u| sixth * u.force / (u.mass * u.speed)),
+            per_roll: each(|j| {
+                machines.gain(|m, u| sixth * u.force / (roll(m, j).mass_kg() * u.speed))
+            }),
+            way: machines.gain(|_, u| sixth * u.speed / u.travel),
         }
     }
-}
 
-impl<A: Arithmetic> Windup<A> {
     /// With κ = R_core/R_wu: J_wu/R_wu² = ½·π·ρ·W·R_wu²·(1 − κ⁴), and {3} Ṙ_wu = z_eff·V_rd/(2π·R_wu).
     ///
     /// `paper` is the speed of the web that arrives times z_eff/z; zero without web.
