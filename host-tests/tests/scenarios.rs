@@ -3,6 +3,8 @@
 //! Not here: what the signals do. A scenario of the library is the test of that.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::path::PathBuf;
 
 use host_tests::machine_file::Description;
@@ -14,6 +16,7 @@ use host_tests::simulator::{Board, Options, Simulator};
 use model_core::image::{self, Commands};
 use model_core::machine::{Machine, PRESETS};
 use proptest::prelude::*;
+use support::winder;
 use tempfile::TempDir;
 
 /// Files in a directory that goes with it.
@@ -75,7 +78,7 @@ fn every_scenario_of_the_library_waits_for_or_expects_something_of_its_own() {
         let scenario = Scenario::open(&file).unwrap();
         let name = file.display().to_string();
         let own = scenario.acts.iter().filter(|act| match act {
-            Act::Step(step) => step.at.file == name && !step.expect.is_empty(),
+            Act::Step(step) => step.at.file == name && step.is_judged(),
             _ => false,
         });
         assert!(own.count() > 0, "{name}");
@@ -603,5 +606,106 @@ mod snapshots {
         }
         assert_eq!(all(&straight), all(&hopping));
         assert_eq!(straight.trajectory(), hopping.trajectory());
+    }
+}
+
+mod command_line {
+    use super::*;
+
+    fn said(output: &std::process::Output) -> String {
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
+    #[test]
+    fn a_scenario_is_played_recorded_and_replayed() {
+        let files = Files::new(&[(
+            "mine.toml",
+            "title = 'Mine'\nstart = 'to_tension'\n[[step]]\nfor = 1\nexpect = ['mode = thread', 'mode = run']",
+        )]);
+        let path = |name: &str| files.path(name).display().to_string();
+        let (scenario, run) = (path("mine.toml"), path("run.csv"));
+        let played = winder(&["scenario", &scenario, "--verbose", "--record", &run])
+            .output()
+            .unwrap();
+        assert_eq!(played.status.code(), Some(1), "one expectation is wrong");
+        let told = said(&played);
+        assert!(
+            told.contains("mine.toml:5: at ") && told.contains("got mode = 2 (thread)"),
+            "{told}"
+        );
+        assert!(told.contains("acknowledge faults"), "{told}");
+        let replayed = winder(&["replay", &run]).output().unwrap();
+        assert!(replayed.status.success());
+        assert!(
+            said(&replayed).contains("to the bit"),
+            "{}",
+            said(&replayed)
+        );
+        let text = std::fs::read_to_string(&run).unwrap();
+        std::fs::write(&run, text.replacen("stall_set,105", "stall_set,106", 1)).unwrap();
+        let replayed = winder(&["replay", &run]).output().unwrap();
+        assert_eq!(replayed.status.code(), Some(1));
+        assert!(
+            said(&replayed).contains("another one"),
+            "{}",
+            said(&replayed)
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_played_is_said() {
+        for (arguments, reason) in [
+            (&["scenario", "no.toml"][..], "cannot read no.toml"),
+            (
+                &["scenario", "--connect", "nowhere"],
+                "--connect nowhere is not HOST:PORT",
+            ),
+            (
+                &["scenario", "--record", "x.csv"],
+                "--record takes the run of one scenario",
+            ),
+            (&["replay", "no.csv"], "cannot read no.csv"),
+        ] {
+            let output = winder(arguments).output().unwrap();
+            assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(said.contains(reason), "{arguments:?}: {said}");
+        }
+    }
+
+    /// The committed figures are those that the command draws, and small.
+    #[test]
+    fn the_figures_are_drawn_each_with_what_to_compare() {
+        let files = Files::new(&[]);
+        let out = files.path("figures").display().to_string();
+        let drawn = winder(&["figures", "--out", &out, "--svg-only"])
+            .output()
+            .unwrap();
+        assert!(
+            drawn.status.success(),
+            "{}",
+            String::from_utf8_lossy(&drawn.stderr)
+        );
+        let names = |directory: &std::path::Path| {
+            let entries = std::fs::read_dir(directory)
+                .unwrap()
+                .map(|entry| entry.unwrap());
+            let mut names: Vec<_> = entries.map(|entry| entry.file_name()).collect();
+            names.sort();
+            names
+        };
+        let drawn = names(&files.path("figures"));
+        let committed = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/figures");
+        assert_eq!(drawn, names(&committed));
+        let mut bytes = 0;
+        for name in drawn {
+            let svg = std::fs::read_to_string(files.path("figures").join(&name)).unwrap();
+            assert!(
+                svg.contains("Compare: ") && !svg.contains("NaN"),
+                "{name:?}"
+            );
+            bytes += svg.len();
+        }
+        assert!(bytes < 300_000, "{bytes} bytes");
     }
 }
