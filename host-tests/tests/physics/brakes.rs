@@ -9,7 +9,9 @@ use crate::{in_both_scalars, near};
 
 in_both_scalars!(
     a_brake_stops_in_momentum_over_force,
+    the_time_of_a_stop_does_not_depend_on_the_step,
     a_brake_holds_the_web_at_standstill_without_creep,
+    a_brake_holds_the_web_over_rolls_one_by_one,
     a_brake_that_is_too_weak_slips_by_the_difference,
     a_brake_acts_after_its_delay,
     the_papers_brake_creeps_and_the_set_valued_one_does_not,
@@ -33,8 +35,12 @@ fn braked<R: Float>() -> Actuators<R> {
     }
 }
 
-/// Steps until the speed is exactly zero; it must stay so.
+/// Time until the speed is exactly zero, in steps of [`H`]; it must stay so.
 fn time_to_stop<R: Float>(bench: &mut Bench<R>, speed: impl Fn(&Bench<R>) -> R) -> f64 {
+    time_to_stop_in(H, bench, speed)
+}
+
+fn time_to_stop_in<R: Float>(h: f64, bench: &mut Bench<R>, speed: impl Fn(&Bench<R>) -> R) -> f64 {
     let mut steps = 0;
     while speed(bench) != R::ZERO {
         assert!(speed(bench) > R::ZERO, "it turns back");
@@ -46,7 +52,7 @@ fn time_to_stop<R: Float>(bench: &mut Bench<R>, speed: impl Fn(&Bench<R>) -> R) 
         bench.winder.step(&braked());
         assert_eq!(speed(bench), R::ZERO);
     }
-    f64::from(steps) * H
+    f64::from(steps) * h
 }
 
 /// T = V_0·M/F_b and ω_0·J/T_b, ± h, after the delay. No web, no other friction.
@@ -74,11 +80,41 @@ fn a_brake_stops_in_momentum_over_force<R: Float>() {
     }
 }
 
-/// The web under stall tension between two held rolls, the motors pulling against the brakes.
+/// T = V_0·M/F_b to a step, whatever the step is: half a minute at 36 m/s.
+fn the_time_of_a_stop_does_not_depend_on_the_step<R: Float>() {
+    let m = frictionless();
+    let b = &m.brakes;
+    let force = b.rd_n_m / m.rear_drum.radius_m + b.fd_n_m / m.front_drum.radius_m;
+    let (v, r) = (36.0, 0.6);
+    let expected = b.delay_s + v * form::windup_mass(&m, r) / force;
+    for h in [0.008, 0.004, 0.002, 0.001, 0.0005] {
+        let mut bench = Bench::<R>::with_step(m.clone(), h);
+        let mut x = bench.x();
+        (x.v[2], x.r_wu) = (v, r);
+        bench.set(&x);
+        let time = time_to_stop_in(h, &mut bench, |bench| bench.winder.state().v[2]);
+        // f32 sums up 60 000 steps
+        near(
+            "time of the stop",
+            time,
+            expected,
+            1.01 * h + form::either::<R>(1e-4, 0.0),
+        );
+    }
+}
+
 fn a_brake_holds_the_web_at_standstill_without_creep<R: Float>() {
-    let m = Machine::news_8000();
+    a_brake_holds::<R, 3>(Machine::news_8000());
+}
+
+fn a_brake_holds_the_web_over_rolls_one_by_one<R: Float>() {
+    a_brake_holds::<R, 8>(Machine::news_8000_unlumped());
+}
+
+/// The web under stall tension between two held rolls, the motors pulling against the brakes.
+fn a_brake_holds<R: Float, const SPANS: usize>(m: Machine) {
     let stall = m.operation.stall_share * form::tension(&m);
-    let mut bench = Bench::<R>::new(m);
+    let mut bench = Bench::<R, SPANS>::new(m);
     bench.winder.thread_at(R::of(stall));
     // until the brakes are closed, the web pulls the rolls together by a hair
     for _ in 0..25 {
@@ -100,7 +136,7 @@ fn a_brake_holds_the_web_at_standstill_without_creep<R: Float>() {
         for _ in 0..(60.0 / H) as u32 {
             bench.winder.step(&pulled);
             let x = bench.winder.state();
-            assert_eq!((x.v[2], x.omega_uw), (R::ZERO, R::ZERO));
+            assert_eq!((x.v[SPANS - 1], x.omega_uw), (R::ZERO, R::ZERO));
         }
         for (t, before) in bench.t().into_iter().zip(tension) {
             // in the first minute the idle rolls come to rest

@@ -26,8 +26,14 @@ pub fn tension(m: &Machine) -> f64 {
 }
 
 /// Lengths of the spans, m
-pub fn lengths(m: &Machine) -> [f64; 3] {
-    [m.idle[0].span_m, m.idle[1].span_m, m.last_span_m]
+pub fn lengths<const SPANS: usize>(m: &Machine) -> [f64; SPANS] {
+    assert_eq!(m.idle.len() + 1, SPANS);
+    std::array::from_fn(|i| m.idle.get(i).map_or(m.last_span_m, |roll| roll.span_m))
+}
+
+/// Number of the span whose tension is measured: it follows the roll on the load cells.
+pub fn measured(m: &Machine) -> usize {
+    m.load_cells.roll + 1
 }
 
 /// ½·π·ρ·W·(R⁴ − r⁴), kg·m²
@@ -81,37 +87,42 @@ pub fn parent_radius(m: &Machine, length: f64) -> f64 {
 }
 
 /// A state with all its rates by the equations of motion, and the tensions that go with it.
-pub struct Motion {
-    pub rates: State<f64, 3>,
-    pub tension: [f64; 3],
+pub struct Motion<const SPANS: usize> {
+    pub rates: State<f64, SPANS>,
+    pub tension: [f64; SPANS],
 }
 
 /// The equations of motion of the threaded winder, without brakes.
-pub fn motion(m: &Machine, x: &State<f64, 3>, torque: &BySection<f64>) -> Motion {
-    let (ea, lengths) = (stiffness(m), lengths(m));
+pub fn motion<const SPANS: usize>(
+    m: &Machine,
+    x: &State<f64, SPANS>,
+    torque: &BySection<f64>,
+) -> Motion<SPANS> {
+    let (ea, lengths) = (stiffness(m), lengths::<SPANS>(m));
     let v_uw = x.omega_uw * x.r_uw;
     // web: d/dt [L/(1+ε)] = V_up/(1+ε_up) − V/(1+ε)
     let stretched = |i: usize| 1.0 + x.strain[i];
     let unstrained = |i: usize| x.v[i] / stretched(i);
-    let strain: [f64; 3] = std::array::from_fn(|i| {
+    let strain: [f64; SPANS] = std::array::from_fn(|i| {
         let entering = if i == 0 { v_uw } else { unstrained(i - 1) };
         stretched(i).powi(2) / lengths[i] * (unstrained(i) - entering)
     });
-    let t: [f64; 3] =
+    let t: [f64; SPANS] =
         std::array::from_fn(|i| (ea * (x.strain[i] + m.web.retardation_s * strain[i])).max(0.0));
     let idle = |i: usize| (t[i + 1] - t[i] - m.idle[i].friction_n_s_m * x.v[i]) / idle_mass(m, i);
-    let v = x.v[2];
+    let v = x.v[SPANS - 1];
     let r_wu = m.web.caliper_m * v / (TAU * x.r_wu);
     let force = torque.rd / m.rear_drum.radius_m
         + torque.fd / m.front_drum.radius_m
         + torque.rr / m.rider_roll.radius_m;
     let growth = shipping_mass(m, x.r_wu) * r_wu / x.r_wu;
-    let windup = (force - t[2] - (windup_friction(m) - growth) * v) / windup_mass(m, x.r_wu);
+    let windup =
+        (force - t[SPANS - 1] - (windup_friction(m) - growth) * v) / windup_mass(m, x.r_wu);
     let parent = torque.uw + x.r_uw * (t[0] - m.parent_roll.friction_n_s_m * v_uw);
     Motion {
         rates: State {
             strain,
-            v: [idle(0), idle(1), windup],
+            v: std::array::from_fn(|i| if i + 1 < SPANS { idle(i) } else { windup }),
             windup: [windup; 3],
             omega_uw: parent / parent_inertia(m, x.r_uw),
             r_uw: -m.web.caliper_m * v_uw / (TAU * x.r_uw),
@@ -122,13 +133,18 @@ pub fn motion(m: &Machine, x: &State<f64, 3>, torque: &BySection<f64>) -> Motion
     }
 }
 
-/// The winder in steady run: V_rd = `v`, `t_gr` in the measured span, all tensions at rest.
-pub fn steady(m: &Machine, v: f64, t_gr: f64, r_uw: f64, r_wu: f64) -> State<f64, 3> {
+/// The winder in steady run: V_rd = `v`, `t` in the measured span, all tensions at rest.
+pub fn steady<const SPANS: usize>(
+    m: &Machine,
+    v: f64,
+    t: f64,
+    r_uw: f64,
+    r_wu: f64,
+) -> State<f64, SPANS> {
     let ea = stiffness(m);
-    let t = steady_tensions(m, v, t_gr);
-    let strain = t.map(|t| t / ea);
+    let strain = steady_tensions::<SPANS>(m, v, t).map(|t| t / ea);
     // V/(1+ε) is the same everywhere
-    let unstrained = v / (1.0 + strain[2]);
+    let unstrained = v / (1.0 + strain[SPANS - 1]);
     State {
         strain,
         v: strain.map(|e| unstrained * (1.0 + e)),
@@ -140,20 +156,36 @@ pub fn steady(m: &Machine, v: f64, t_gr: f64, r_uw: f64, r_wu: f64) -> State<f64
     }
 }
 
-/// t_gr − t_uw = c_gr·V, t_sr − t_gr = c_sr·V
-pub fn steady_tensions(m: &Machine, v: f64, t_gr: f64) -> [f64; 3] {
-    let friction = |i: usize| m.idle[i].friction_n_s_m * v;
-    [t_gr - friction(0), t_gr, t_gr + friction(1)]
+/// What each idle roll takes from the tension adds up along the web, from the measured span both ways.
+fn tensions<const SPANS: usize>(m: &Machine, t: f64, taken: impl Fn(usize) -> f64) -> [f64; SPANS] {
+    let taken = &taken;
+    let measured = measured(m);
+    std::array::from_fn(|span| {
+        let before: f64 = (span..measured).map(taken).sum();
+        let after: f64 = (measured..span).map(taken).sum();
+        t - before + after
+    })
 }
 
-/// Torques that accelerate all surfaces by `a` [m/s²] with `t_gr` in the measured span.
+/// The idle roll between two spans takes c·V: with lumped rolls t_gr − t_uw = c_gr·V, t_sr − t_gr = c_sr·V
+pub fn steady_tensions<const SPANS: usize>(m: &Machine, v: f64, t: f64) -> [f64; SPANS] {
+    tensions(m, t, |i| m.idle[i].friction_n_s_m * v)
+}
+
+/// Torques that accelerate all surfaces by `a` [m/s²] with `t` in the measured span.
 ///
 /// The parent roll also speeds up as its radius falls, ω̇ = (a − ω·Ṙ)/R, and a growing shipping roll turns slower at
 /// one surface speed.
-pub fn torques(m: &Machine, x: &State<f64, 3>, t_gr: f64, a: f64) -> BySection<f64> {
+pub fn torques<const SPANS: usize>(
+    m: &Machine,
+    x: &State<f64, SPANS>,
+    t: f64,
+    a: f64,
+) -> BySection<f64> {
     let idle = |i: usize| m.idle[i].friction_n_s_m * x.v[i] + idle_mass(m, i) * a;
-    let (t_uw, t_sr) = (t_gr - idle(0), t_gr + idle(1));
-    let (v_uw, v) = (x.omega_uw * x.r_uw, x.v[2]);
+    let t: [f64; SPANS] = tensions(m, t, idle);
+    let (t_uw, t_sr) = (t[0], t[SPANS - 1]);
+    let (v_uw, v) = (x.omega_uw * x.r_uw, x.v[SPANS - 1]);
     let layer = m.web.caliper_m / TAU;
     let spin_up = (a + layer * x.omega_uw * x.omega_uw) / x.r_uw;
     let parent =
@@ -179,12 +211,12 @@ pub fn either<R: Scalar>(single: f64, double: f64) -> f64 {
 }
 
 /// A winder under test.
-pub struct Bench<R: Scalar> {
+pub struct Bench<R: Scalar, const SPANS: usize = 3> {
     pub machine: Machine,
-    pub winder: Winder<R, 3>,
+    pub winder: Winder<R, SPANS>,
 }
 
-impl<R: Scalar> Bench<R> {
+impl<R: Scalar, const SPANS: usize> Bench<R, SPANS> {
     /// At standstill, not threaded, in steps of [`H`].
     pub fn new(machine: Machine) -> Self {
         Self::with_step(machine, H)
@@ -197,24 +229,24 @@ impl<R: Scalar> Bench<R> {
     }
 
     /// Threaded, in the state `x`.
-    pub fn threaded(machine: Machine, x: &State<f64, 3>) -> Self {
+    pub fn threaded(machine: Machine, x: &State<f64, SPANS>) -> Self {
         let mut bench = Self::new(machine);
         bench.winder.thread_at(R::Si::ZERO);
         bench.set(x);
         bench
     }
 
-    pub fn set(&mut self, x: &State<f64, 3>) {
+    pub fn set(&mut self, x: &State<f64, SPANS>) {
         self.winder.set_state(&x.map(R::Si::of));
     }
 
     /// The state as `f64`.
-    pub fn x(&self) -> State<f64, 3> {
+    pub fn x(&self) -> State<f64, SPANS> {
         self.winder.state().map(Real::to_f64)
     }
 
     /// The tensions as `f64`, N.
-    pub fn t(&self) -> [f64; 3] {
+    pub fn t(&self) -> [f64; SPANS] {
         self.winder.tension().map(Real::to_f64)
     }
 
@@ -226,9 +258,9 @@ impl<R: Scalar> Bench<R> {
         });
     }
 
-    /// One step of the machine accelerated by `a` with `t_gr` in the measured span.
-    pub fn pull(&mut self, t_gr: f64, a: f64) -> BySection<f64> {
-        let torque = torques(&self.machine, &self.x(), t_gr, a);
+    /// One step of the machine accelerated by `a` with `t` in the measured span.
+    pub fn pull(&mut self, t: f64, a: f64) -> BySection<f64> {
+        let torque = torques(&self.machine, &self.x(), t, a);
         self.step(&torque);
         torque
     }

@@ -20,6 +20,7 @@ mod integration;
 mod modes;
 mod nips;
 mod radii;
+mod reference;
 mod schedule;
 mod sensing;
 mod sums;

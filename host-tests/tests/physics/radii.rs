@@ -1,5 +1,7 @@
 //! Radii over length, and what the rolls give and take.
 
+use std::f64::consts::PI;
+
 use model_core::exchange::BySection;
 use model_core::machine::Machine;
 use model_core::plant::units::{One, Units};
@@ -11,6 +13,7 @@ use crate::{in_both_scalars, near};
 
 in_both_scalars!(
     radii_follow_the_length,
+    an_hour_of_thread_speed_moves_the_radii_by_the_closed_form,
     mass_of_the_windup_is_that_of_its_rolls,
     a_free_parent_roll_keeps_its_speed_while_its_radius_falls,
 );
@@ -69,6 +72,33 @@ fn radii_follow_the_length<R: Float>() {
         near("R_wu of the table", x.r_wu, r, rate * RUN * H + 0.5e-6);
     }
     near("run speed held", bench.x().v[2], RUN, 0.01);
+}
+
+/// 1 500 m at 25 m/min from a full parent roll on to a large shipping roll: in a step, either radius moves by less
+/// than f32 can tell.
+fn an_hour_of_thread_speed_moves_the_radii_by_the_closed_form<R: Float>() {
+    let m = Machine::news_8000();
+    let stall = m.operation.stall_share * form::tension(&m);
+    let v = m.operation.thread_speed_m_s;
+    let (r_uw, r_wu) = (1.5, 0.5);
+    let x = form::steady(&m, v, stall, r_uw, r_wu);
+    let mut bench = Bench::<R>::threaded(m.clone(), &x);
+    // as f32 rounds it
+    let start = bench.x();
+    let (mut wound, mut unwound) = (0.0, 0.0);
+    for _ in 0..(3600.0 / H).round() as u32 {
+        bench.pull(stall, 0.0);
+        let x = bench.x();
+        wound += x.travel;
+        unwound += H * x.omega_uw * x.r_uw;
+    }
+    let end = bench.x();
+    near("V", end.v[2], v, 0.01 * v);
+    let layers = |length: f64| m.web.caliper_m * length / PI;
+    let rise = (start.r_wu.powi(2) + layers(wound)).sqrt() - start.r_wu;
+    let fall = start.r_uw - (start.r_uw.powi(2) - layers(unwound)).sqrt();
+    near("R_wu", end.r_wu - start.r_wu, rise, 1e-4 * rise);
+    near("R_uw", start.r_uw - end.r_uw, fall, 1e-4 * fall);
 }
 
 /// M at the core and at 1.25 m, and as a step of the winder shows it: M = F·h/ΔV.

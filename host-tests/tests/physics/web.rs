@@ -46,21 +46,29 @@ fn follow<R: Float, const SPANS: usize>(
     x
 }
 
-fn spans<R: Float>(m: &Machine) -> Spans<R, 3> {
+fn spans<R: Float, const SPANS: usize>(m: &Machine) -> Spans<R, SPANS> {
     Spans::new(&One(m, &Units::SI), SIX)
 }
 
 /// With constant speeds 1/(1+ε) is an exact lag of L/V.
 fn a_span_lags_by_its_length_over_speed<R: Float>() {
-    let m = Machine::news_8000();
-    for (i, lag) in [(0, 0.1636), (1, 0.0818), (2, 0.0682)] {
-        near("L/V", form::lengths(&m)[i] / RUN, lag, 0.5e-4);
+    spans_lag::<R, 3>(&Machine::news_8000(), [0.1636, 0.0818, 0.0682]);
+    let unlumped = [
+        0.1091, 0.0409, 0.0273, 0.0273, 0.0273, 0.0327, 0.0218, 0.0273,
+    ];
+    spans_lag::<R, 8>(&Machine::news_8000_unlumped(), unlumped);
+}
+
+fn spans_lag<R: Float, const SPANS: usize>(m: &Machine, lags: [f64; SPANS]) {
+    let lengths = form::lengths::<SPANS>(m);
+    for (i, lag) in lags.into_iter().enumerate() {
+        near("L/V", lengths[i] / RUN, lag, 0.5e-4);
         // the span's roll and all after it run 0.1 % faster
-        let mut v = [RUN; 3];
+        let mut v = [RUN; SPANS];
         v[i..].fill(1.001 * RUN);
         for time in [0.04, 0.08, 0.16] {
-            let strain = follow(&spans::<R>(&m), RUN, v, [0.0; 3], time)[i];
-            let gone = 1.0 - (-time * v[i] / form::lengths(&m)[i]).exp();
+            let strain = follow(&spans::<R, SPANS>(m), RUN, v, [0.0; SPANS], time)[i];
+            let gone = 1.0 - (-time * v[i] / lengths[i]).exp();
             // 1/(1+ε) = 1 − (1 − 1/1.001)·gone
             let expected = 1.0 / (1.0 - (1.0 - 1.0 / 1.001) * gone) - 1.0;
             // f32 knows the draw V − V_up to an ulp of V: 2e-4 of itself
@@ -71,11 +79,15 @@ fn a_span_lags_by_its_length_over_speed<R: Float>() {
 
 /// Δt = EA·(1+ε)·0.1 % = 2 083 N
 fn a_step_of_speed_changes_the_tension_by_its_stiffness<R: Float>() {
-    let m = Machine::news_8000();
-    let x = form::steady(&m, RUN, form::tension(&m), 1.5, 0.05);
+    a_step_of_speed::<R, 3>(&Machine::news_8000());
+    a_step_of_speed::<R, 8>(&Machine::news_8000_unlumped());
+}
+
+fn a_step_of_speed<R: Float, const SPANS: usize>(m: &Machine) {
+    let x = form::steady::<SPANS>(m, RUN, form::tension(m), 1.5, 0.05);
     let mut v = x.v;
-    v[2] *= 1.001;
-    let spans = spans::<R>(&m);
+    v[SPANS - 1] *= 1.001;
+    let spans = spans::<R, SPANS>(m);
     let settled = follow(&spans, x.omega_uw * x.r_uw, v, x.strain, 2.0);
     let web = spans.web(
         R::of(x.omega_uw * x.r_uw),
@@ -83,15 +95,19 @@ fn a_step_of_speed_changes_the_tension_by_its_stiffness<R: Float>() {
         &settled.map(R::of),
     );
     let t = web.tension.map(R::to_f64);
-    let before = form::steady_tensions(&m, RUN, form::tension(&m));
-    // an ulp of V in f32 is 3.8e-6 m/s: 0.2 N in EA·ΔV/V
-    near("t_uw", t[0], before[0], 1.0);
-    near("t_gr", t[1], before[1], 1.0);
-    near("Δt_sr", t[2] - before[2], 2083.0, 1.0);
+    let before = form::steady_tensions::<SPANS>(m, RUN, form::tension(m));
+    // an ulp of V in f32 is 3.8e-6 m/s: 0.2 N in EA·ΔV/V for each roll before the span
+    let tolerance = 1.0_f64.max(0.2 * SPANS as f64);
+    for i in 0..SPANS - 1 {
+        near("t", t[i], before[i], tolerance);
+    }
+    near("Δt_sr", t[SPANS - 1] - before[SPANS - 1], 2083.0, tolerance);
 }
 
-/// H. Koç et al., IEEE TCST 10 (2002) 179, figure 3: L = 1 m, ε_1 = 5 %, V 1 → 1.01 m/s. The form that is linear
-/// in the strain gives 0.0594 and 0.0405.
+/// H. Koç et al., IEEE TCST 10 (2002) 179, figure 3: L = 1 m, ε_1 = 5 %, V 1 → 1.01 m/s and 1.01 → 1 m/s. Two
+/// linear forms of continuity lie 1.1e-3 and 1e-4 beside it; at rest they give
+///
+/// ε_2 = (V_2 − V_1 + V_1·ε_1)/V_2, the classical one, and the same over 2·V_1 − V_2.
 fn strain_is_exact_at_large_strains<R: Float>() {
     let mut m = Machine::news_8000();
     m.idle[0].span_m = 1.0;
@@ -102,6 +118,11 @@ fn strain_is_exact_at_large_strains<R: Float>() {
         let v_in = v[0] / 1.05;
         let settled = follow(&spans, v_in, v, [0.05, 0.05], 20.0)[1];
         near("ε_2", settled, expected, 0.5e-4);
+        // the winder's form is none of the linear ones
+        let gain = v[1] - v[0] + v[0] * 0.05;
+        let (classical, other) = (gain / v[1], gain / (2.0 * v[0] - v[1]));
+        assert!((settled - classical).abs() > 8e-4, "{settled}, {classical}");
+        assert!((settled - other).abs() > 0.5e-4, "{settled}, {other}");
         near("ε_2", settled, 1.05 * v[1] / v[0] - 1.0, 1e-6);
         // on the way, again an exact lag: L/V = 1 s
         let time = 1.0;
@@ -114,17 +135,23 @@ fn strain_is_exact_at_large_strains<R: Float>() {
 
 /// t_gr − t_uw = c_gr·V = 229 N, t_sr − t_gr = c_sr·V = 264 N
 fn idle_rolls_take_their_friction_from_the_tension<R: Float>() {
-    let m = Machine::news_8000();
+    idle_rolls_take::<R, 3>(Machine::news_8000());
+    // five rolls before the measured span and two after it
+    idle_rolls_take::<R, 8>(Machine::news_8000_unlumped());
+}
+
+fn idle_rolls_take<R: Float, const SPANS: usize>(m: Machine) {
     let x = form::steady(&m, RUN, form::tension(&m), 1.5, 0.05);
-    let mut bench = Bench::<R>::threaded(m, &x);
+    let measured = form::measured(&m);
+    let mut bench = Bench::<R, SPANS>::threaded(m, &x);
     for _ in 0..(20.0 / H) as u32 {
         bench.pull(2800.0, 0.0);
     }
     let t = bench.t();
     // over 20 s the speed has moved by less than 1e-3; f32 resolves tensions at run speed to 0.5 N
-    near("t_gr − t_uw", t[1] - t[0], 229.0, 1.0);
-    near("t_sr − t_gr", t[2] - t[1], 264.0, 1.0);
-    near("t_gr", t[1], 2800.0, 10.0);
+    near("t_gr − t_uw", t[measured] - t[0], 229.0, 1.0);
+    near("t_sr − t_gr", t[SPANS - 1] - t[measured], 264.0, 1.0);
+    near("t_gr", t[measured], 2800.0, 10.0);
 }
 
 /// A loop in the web neither pulls nor pushes: idle rolls without friction keep their speed to the bit.

@@ -259,7 +259,7 @@ impl Machine {
 
     /// `LAB-300`: newsprint of 0.3 m at 240 m/min on a machine that stands on a desk.
     ///
-    /// Steel rolls of 60 mm and a web path with loops keep the web's modes below 200 rad/s, where steps of 4 ms hold
+    /// Steel rolls of 60 mm and a web path with loops keep the web's modes below 200 rad/s, where steps of 1 ms hold
     /// them: a short path over light rolls would be ten times as stiff.
     pub fn lab_300() -> Self {
         let news = Self::news_8000();
