@@ -6,6 +6,7 @@
 
 pub mod command;
 pub mod figures;
+pub mod handbook;
 pub mod interrupt;
 pub mod link;
 pub mod log;

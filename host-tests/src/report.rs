@@ -14,7 +14,7 @@ use crate::plc::{Recipe, Sample};
 /// Permitted deviation of the tension in acceleration and deceleration, of its reference.
 pub const TENSION_BAND: f64 = 0.10;
 /// Permitted error of the roll's diameter, mm.
-pub const DIAMETER_TOLERANCE_MM: f64 = 2.0;
+pub const DIAMETER_TOLERANCE_MM: f64 = 1.0;
 /// The reference ramps where its acceleration is above this, m/s².
 const RAMPING_M_S2: f64 = 0.005;
 /// At thread speed and above, the last count of the feedback aside.
@@ -270,16 +270,16 @@ mod tests {
     #[test]
     fn a_limit_is_missed_by_what_lies_beyond_it() {
         use Mode::{NormalStop, Run};
-        let good = [(Run, 0.45, 0.91, 300.0), (NormalStop, -0.45, 1.09, 401.9)];
+        let good = [(Run, 0.45, 0.91, 300.0), (NormalStop, -0.45, 1.09, 400.9)];
         assert!(report(&good).missed().is_empty());
         for (i, bad, missed) in [
             (0, (Run, 0.45, 0.89, 300.0), "tension in acceleration"),
             (
                 1,
-                (NormalStop, -0.45, 1.11, 401.9),
+                (NormalStop, -0.45, 1.11, 400.9),
                 "tension in deceleration",
             ),
-            (1, (NormalStop, -0.45, 1.09, 402.1), "diameter of the roll"),
+            (1, (NormalStop, -0.45, 1.09, 401.1), "diameter of the roll"),
             // what has not been seen has not been kept
             (0, (Run, 0.0, 1.0, 300.0), "tension in acceleration"),
         ] {

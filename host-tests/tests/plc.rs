@@ -52,6 +52,30 @@ fn any_set_is_wound_within_its_limits() {
     }
 }
 
+/// The true roll, not only its measurement: within 1 mm of what was wanted, whatever the speed and the size.
+#[test]
+fn a_normal_stop_ends_at_the_diameter_within_a_millimetre() {
+    for (diameter_m, speed_m_min) in [
+        (0.13, 60.0),
+        (0.15, 2200.0),
+        (0.40, 300.0),
+        (0.40, 1200.0),
+        (0.75, 2200.0),
+        (1.25, 2200.0),
+    ] {
+        let mut truth = 0.0;
+        wind_with(&recipe(diameter_m, speed_m_min), |winder, _| {
+            truth = 2.0 * f64::from(winder.plant.winder().state().r_wu);
+        })
+        .unwrap_or_else(|trouble| panic!("{diameter_m} m: {trouble}"));
+        let error = 1e3 * (truth - diameter_m);
+        assert!(
+            error.abs() < 1.0,
+            "{diameter_m} m at {speed_m_min} m/min: {error} mm"
+        );
+    }
+}
+
 #[test]
 fn a_refusal_ends_the_set_and_names_step_reason_and_state() {
     let mut recipe = recipe(0.40, 1200.0);

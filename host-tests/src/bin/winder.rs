@@ -44,7 +44,7 @@ enum Command {
     /// The file is what `--machine` takes. One of your own names a preset and what differs from it.
     Machine(machine::Args),
     /// Print the signal list as CSV
-    Signals,
+    Signals(signals::Args),
 }
 
 /// What a shell says of a program that Ctrl-C has ended: 128 + SIGINT.
@@ -63,7 +63,7 @@ fn main() -> ExitCode {
 
 fn run(cli: Cli) -> Result<ExitCode> {
     match cli.command {
-        Command::Signals => signals::main(),
+        Command::Signals(args) => signals::main(&args),
         Command::Machine(args) => machine::main(&args),
         Command::Scenario(args) => scenario::main(&args),
         Command::Replay(args) => replay::main(&args),

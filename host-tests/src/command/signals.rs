@@ -1,16 +1,31 @@
 //! `winder signals`
 
-use std::io;
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 
-/// Prints the signal list as CSV.
-pub fn main() -> Result<ExitCode> {
-    match crate::signals::write(io::stdout().lock()) {
+use crate::handbook;
+
+/// Options of `winder signals`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Print docs/drive.md instead, with its tables of modes, refusals, faults and signals as they are now
+    #[arg(long)]
+    markdown: bool,
+}
+
+/// Prints the signal list.
+pub fn main(args: &Args) -> Result<ExitCode> {
+    let mut out = io::stdout().lock();
+    let written = if args.markdown {
+        out.write_all(handbook::refreshed(handbook::PAGE).as_bytes())
+    } else {
+        crate::signals::write(out).map_err(io::Error::from)
+    };
+    match written {
         // whoever reads us has seen enough
-        Err(error) if matches!(error.kind(), csv::ErrorKind::Io(e) if e.kind() == io::ErrorKind::BrokenPipe) =>
-            {}
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
         written => written.context("cannot write the signal list")?,
     }
     Ok(ExitCode::SUCCESS)

@@ -1,8 +1,8 @@
 //! Whatever is commanded: no transition beside the table, no set-point beside its limits.
 //!
 //! Two machines answer: a caricature that does what it is asked within a cycle or so, fast enough for millions of
-//! cycles, and the simulator itself. `WINDER_LOGIC_CYCLES` sets the number of cycles of the first (10 000 000 is a
-//! minute in a release build).
+//! cycles, and the simulator itself. `WINDER_LOGIC_CYCLES` sets the number of cycles of the first (10 000 000 take a
+//! quarter of a minute).
 
 use crate::operator::Operator;
 use model_core::exchange::{
@@ -322,7 +322,6 @@ fn no_command_leads_beside_the_table_or_its_limits() {
             .collect()
     };
     let missed = ways(&seen);
-    eprintln!("{missed:?}");
     assert!(missed.len() <= 6, "never gone: {missed:?}");
     let unseen: Vec<_> = Refusal::ALL
         .iter()
