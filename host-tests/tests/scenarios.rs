@@ -78,7 +78,9 @@ fn every_scenario_of_the_library_waits_for_or_expects_something_of_its_own() {
         let scenario = Scenario::open(&file).unwrap();
         let name = file.display().to_string();
         let own = scenario.acts.iter().filter(|act| match act {
-            Act::Step(step) => step.at.file == name && step.is_judged(),
+            Act::Step(step) => {
+                step.at.file == name && (step.is_judged() || !step.expect.is_empty())
+            }
             _ => false,
         });
         assert!(own.count() > 0, "{name}");
