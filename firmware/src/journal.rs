@@ -21,6 +21,7 @@ impl Journal for () {
 }
 
 /// Sees what has changed from one drive cycle to the next.
+#[derive(Clone, Debug)]
 pub struct Observer {
     commands: Commands,
     state: [u16; 3],

@@ -11,6 +11,9 @@ use crate::journal::{Journal, Observer};
 use crate::{SPANS, Scalar};
 
 /// The simulator with its journal; does in one call what the three tasks do in a drive cycle.
+///
+/// A clone is a snapshot: with the image of the same moment it goes on to the same bits.
+#[derive(Clone, Debug)]
 pub struct Lockstep<J> {
     simulator: Simulator<Scalar, SPANS>,
     observer: Observer,

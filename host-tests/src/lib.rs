@@ -5,6 +5,7 @@
 //! program is the command line tool `winder`: a module of [`command`] for each subcommand.
 
 pub mod command;
+pub mod figures;
 pub mod handbook;
 pub mod interrupt;
 pub mod link;
@@ -15,6 +16,7 @@ pub mod plc;
 pub mod plot;
 pub mod qemu;
 pub mod report;
+pub mod scenario;
 pub mod setup;
 pub mod signals;
 pub mod simulator;

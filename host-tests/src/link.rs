@@ -48,8 +48,17 @@ impl Link {
 
     /// Writes the commands of a winder PLC (function code 16).
     pub fn write(&mut self, commands: &Commands) -> Result<()> {
+        self.put(&commands.words[..PLC_COMMAND_WORDS])
+    }
+
+    /// Writes the whole command block, with the faults that a test puts in.
+    pub fn write_all(&mut self, commands: &Commands) -> Result<()> {
+        self.put(&commands.words)
+    }
+
+    fn put(&mut self, words: &[u16]) -> Result<()> {
         self.context
-            .write_multiple_registers(0, &commands.words[..PLC_COMMAND_WORDS])
+            .write_multiple_registers(0, words)
             .map_err(anyhow::Error::from)
             .and_then(|answer| answer.map_err(|exception| anyhow!("exception: {exception}")))
             .with_context(|| self.failed("write the command block"))

@@ -375,7 +375,7 @@ fn nearest(name: &str) -> &'static str {
         .unwrap_or("")
 }
 
-fn number(value: &DeValue) -> Option<f64> {
+pub(crate) fn number(value: &DeValue) -> Option<f64> {
     match value {
         DeValue::Float(float) => float.as_str().parse().ok(),
         DeValue::Integer(whole) => integer(whole).map(|whole| whole as f64),
@@ -383,12 +383,12 @@ fn number(value: &DeValue) -> Option<f64> {
     }
 }
 
-fn integer(whole: &DeInteger) -> Option<i128> {
+pub(crate) fn integer(whole: &DeInteger) -> Option<i128> {
     i128::from_str_radix(whole.as_str(), whole.radix()).ok()
 }
 
 /// A value as the file has it, or the beginning of it.
-fn excerpt<'a>(text: &'a str, value: &Spanned<DeValue>) -> &'a str {
+pub(crate) fn excerpt<'a>(text: &'a str, value: &Spanned<DeValue>) -> &'a str {
     let all = text.get(value.span()).unwrap_or("");
     let line = all.lines().next().unwrap_or("");
     let end = line

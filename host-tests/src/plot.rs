@@ -1,7 +1,8 @@
-//! The picture of a run: speed, tension, torques and diameters over one time axis.
+//! Pictures of curves over one axis: the picture of a run in the manner of the paper's figures 7 to 14, and any
+//! other figure of the same kind.
 //!
-//! Not here: plotting in general. One picture in the manner of the paper's figures 7 to 14, drawn from the
-//! samples as SVG; the PNG is the same drawing.
+//! Not here: plotting in general: a figure is a column of diagrams that share their horizontal axis. It is drawn as
+//! SVG; the PNG is the same drawing.
 
 use std::fmt::Write;
 use std::sync::Arc;
@@ -38,92 +39,187 @@ const FAINT: &str = "#e6e9ed";
 const BAND: &str = "#e3e5e8";
 /// About the width of a letter.
 const LETTER: f64 = 6.4;
+/// The same of a caption's letter, and the height of its line.
+const CAPTION_LETTER: f64 = 7.0;
+const CAPTION_LINE: f64 = 20.0;
+/// A curve may be drawn off its points by so much.
+const THIN: f64 = 0.1;
+
+/// Points of a curve: where on the common axis, and the value there.
+pub type Points = Vec<(f64, f64)>;
+
+/// What a curve looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ink {
+    /// The first curve.
+    Blue,
+    /// The second.
+    Orange,
+    /// The third.
+    Green,
+    /// What the others are compared with: grey and dashed.
+    Reference,
+}
+
+impl Ink {
+    fn colour(self) -> &'static str {
+        match self {
+            Ink::Blue => BLUE,
+            Ink::Orange => ORANGE,
+            Ink::Green => GREEN,
+            Ink::Reference => GREY,
+        }
+    }
+}
 
 /// A curve of a panel.
-struct Curve {
-    name: &'static str,
-    signal: &'static Signal,
-    colour: &'static str,
-    width: f64,
-    dashed: bool,
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Its name in the legend.
+    pub name: String,
+    /// What it looks like.
+    pub ink: Ink,
+    /// What it shows.
+    pub points: Points,
 }
 
-const fn curve(name: &'static str, signal: &'static Signal, colour: &'static str) -> Curve {
-    Curve {
-        name,
-        signal,
-        colour,
-        width: 1.6,
-        dashed: false,
+impl Curve {
+    /// A curve.
+    pub fn new(name: &str, ink: Ink, points: Points) -> Self {
+        Self {
+            name: name.to_owned(),
+            ink,
+            points,
+        }
     }
 }
 
-const fn reference(name: &'static str, signal: &'static Signal) -> Curve {
-    Curve {
-        name,
-        signal,
-        colour: GREY,
-        width: 1.4,
-        dashed: true,
-    }
+/// One diagram of a figure.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// What it shows, with its unit.
+    pub title: String,
+    /// Height of the diagram.
+    pub height: f64,
+    /// Its curves.
+    pub curves: Vec<Curve>,
+    /// A band about these points, of their values.
+    pub band: Option<(Points, f64)>,
 }
 
-/// One diagram of the picture.
-struct Panel {
+/// A figure.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// What it is.
+    pub title: String,
+    /// Of what.
+    pub subtitle: String,
+    /// Its diagrams, from above.
+    pub panels: Vec<Panel>,
+    /// The common axis, with its unit.
+    pub axis: String,
+    /// What to compare; empty for none.
+    pub caption: String,
+}
+
+/// The curves of a run: name, ink, signal.
+type RunCurves = &'static [(&'static str, Ink, &'static Signal)];
+
+/// A panel of the picture of a run.
+struct RunPanel {
     title: &'static str,
     height: f64,
-    curves: &'static [Curve],
+    curves: RunCurves,
     /// A band about this signal, of its value.
     band: Option<(&'static Signal, f64)>,
 }
 
-const PANELS: &[Panel] = &[
-    Panel {
+const RUN: &[RunPanel] = &[
+    RunPanel {
         title: "Web speed, m/min",
         height: 170.0,
         curves: &[
-            reference("reference", &image::V_REF),
-            curve("measured", &image::V_WEB, BLUE),
+            ("reference", Ink::Reference, &image::V_REF),
+            ("measured", Ink::Blue, &image::V_WEB),
         ],
         band: None,
     },
-    Panel {
+    RunPanel {
         title: "Web tension, N/m",
         height: 210.0,
         curves: &[
-            reference("reference ±10 %", &image::TENSION_REF),
-            curve("measured", &image::TENSION, ORANGE),
+            ("reference ±10 %", Ink::Reference, &image::TENSION_REF),
+            ("measured", Ink::Orange, &image::TENSION),
         ],
         band: Some((&image::TENSION_REF, TENSION_BAND)),
     },
-    Panel {
+    RunPanel {
         title: "Motor torque, % of rated",
         height: 210.0,
         curves: &[
-            curve("unwind", &image::TORQUE_UW, BLUE),
-            curve("rear drum", &image::TORQUE_RD, ORANGE),
-            curve("front drum", &image::TORQUE_FD, GREEN),
+            ("unwind", Ink::Blue, &image::TORQUE_UW),
+            ("rear drum", Ink::Orange, &image::TORQUE_RD),
+            ("front drum", Ink::Green, &image::TORQUE_FD),
         ],
         band: None,
     },
-    Panel {
+    RunPanel {
         title: "Diameter, mm",
         height: 170.0,
         curves: &[
-            curve("parent roll (drive's estimate)", &image::D_UW, BLUE),
-            curve("shipping roll", &image::D_WU, ORANGE),
+            ("parent roll (drive's estimate)", Ink::Blue, &image::D_UW),
+            ("shipping roll", Ink::Orange, &image::D_WU),
         ],
         band: None,
     },
 ];
 
-/// The picture as SVG.
+/// The picture of a run as SVG.
 pub fn svg(title: &str, subtitle: &str, samples: &[Sample]) -> String {
-    let height = HEAD + STRIP + FOOT + PANELS.iter().map(|p| p.height + GAP).sum::<f64>();
+    let points =
+        |signal: &Signal| -> Points { samples.iter().map(|s| (s.t_s, s.value(signal))).collect() };
+    let panels = RUN.iter().map(|panel| Panel {
+        title: panel.title.to_owned(),
+        height: panel.height,
+        curves: panel
+            .curves
+            .iter()
+            .map(|(name, ink, signal)| Curve::new(name, *ink, points(signal)))
+            .collect(),
+        band: panel.band.map(|(signal, share)| (points(signal), share)),
+    });
+    let figure = Figure {
+        title: title.to_owned(),
+        subtitle: subtitle.to_owned(),
+        panels: panels.collect(),
+        axis: "time, s".to_owned(),
+        caption: String::new(),
+    };
     let end_s = samples.last().map_or(1.0, |s| s.t_s.max(1.0));
+    draw(&figure, &modes(samples, end_s), end_s)
+}
+
+impl Figure {
+    /// The figure as SVG.
+    pub fn svg(&self) -> String {
+        let curves = self.panels.iter().flat_map(|panel| &panel.curves);
+        let ends = curves.flat_map(|curve| curve.points.last());
+        let end = ends.fold(0.0, |end: f64, (x, _)| end.max(*x));
+        draw(self, &[], if end > 0.0 { end } else { 1.0 })
+    }
+}
+
+fn draw(figure: &Figure, spans: &[Span], end: f64) -> String {
+    let strip_height = if spans.is_empty() { 0.0 } else { STRIP };
+    let panels: f64 = figure.panels.iter().map(|p| p.height + GAP).sum();
+    let caption = wrap(
+        &figure.caption,
+        ((WIDTH - LEFT - RIGHT) / CAPTION_LETTER) as usize,
+    );
+    let height = HEAD + strip_height + FOOT + panels + CAPTION_LINE * caption.len() as f64;
     let time = Axis {
         low: 0.0,
-        high: end_s,
+        high: end,
         from: LEFT,
         to: WIDTH - RIGHT,
     };
@@ -133,24 +229,43 @@ pub fn svg(title: &str, subtitle: &str, samples: &[Sample]) -> String {
          font-family=\"Ubuntu, 'Helvetica Neue', Arial, sans-serif\" font-size='13' fill='{INK}'>\n\
          <rect width='100%' height='100%' fill='white'/>\n"
     ));
-    out.text(LEFT, 32.0, "font-size='20'", title);
-    out.text(LEFT, 54.0, &format!("fill='{GREY}'"), subtitle);
+    out.text(LEFT, 32.0, "font-size='20'", &figure.title);
+    out.text(LEFT, 54.0, &format!("fill='{GREY}'"), &figure.subtitle);
 
-    let spans = modes(samples, end_s);
     let mut y = HEAD;
-    strip(&mut out, &spans, &time, y);
-    y += STRIP;
-    for panel in PANELS {
+    strip(&mut out, spans, &time, y);
+    y += strip_height;
+    for panel in &figure.panels {
         y += GAP;
-        draw(&mut out, panel, samples, &spans, &time, y);
+        draw_panel(&mut out, panel, spans, &time, y);
         y += panel.height;
     }
     for t in time.ticks(10) {
         out.text(time.at(t), y + 20.0, "text-anchor='middle'", &number(t));
     }
-    out.text(WIDTH - RIGHT, y + 40.0, "text-anchor='end'", "time, s");
+    out.text(WIDTH - RIGHT, y + 40.0, "text-anchor='end'", &figure.axis);
+    y += FOOT;
+    for line in caption {
+        out.text(LEFT, y + 8.0, "font-size='14'", &line);
+        y += CAPTION_LINE;
+    }
     out.0.push_str("</svg>\n");
     out.0
+}
+
+/// A text in lines of at most so many letters, between its words.
+fn wrap(text: &str, letters: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= letters => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
 }
 
 /// An SVG as PNG, with the program's own font.
@@ -220,8 +335,9 @@ impl Axis {
     }
 }
 
-/// A tick's value, with a proper minus sign.
+/// A tick's value, without the last digits of its computation, with a proper minus sign.
 fn number(value: f64) -> String {
+    let value = (value * 1e9).round() / 1e9;
     value.to_string().replace('-', "\u{2212}")
 }
 
@@ -296,8 +412,8 @@ fn strip(out: &mut Svg, spans: &[Span], time: &Axis, y: f64) {
     }
 }
 
-fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: &Axis, top: f64) {
-    let value = range(panel, samples, top);
+fn draw_panel(out: &mut Svg, panel: &Panel, spans: &[Span], time: &Axis, top: f64) {
+    let value = range(panel, top);
     let bottom = top + panel.height;
     for v in value.ticks(4) {
         let y = value.at(v);
@@ -310,12 +426,18 @@ fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: 
     }
     out.line((time.from, value.at(0.0)), (time.to, value.at(0.0)), GREY);
 
-    out.text(LEFT, top - 10.0, "font-size='14'", panel.title);
+    out.text(LEFT, top - 10.0, "font-size='14'", &panel.title);
     legend(out, panel, time.to, top - 10.0);
 
-    if let Some((signal, share)) = panel.band {
-        let edge = |share: f64| trace(samples, time, &value, |s| s.value(signal) * (1.0 + share));
-        let (above, below) = (edge(share), edge(-share));
+    if let Some((points, share)) = &panel.band {
+        let edge = |share: f64| {
+            let scaled: Points = points
+                .iter()
+                .map(|(t, v)| (*t, v * (1.0 + share)))
+                .collect();
+            thin(&trace(&scaled, time, &value))
+        };
+        let (above, below) = (edge(*share), edge(-share));
         if !above.is_empty() {
             let points = above.iter().chain(below.iter().rev());
             out.add(format_args!(
@@ -324,12 +446,9 @@ fn draw(out: &mut Svg, panel: &Panel, samples: &[Sample], spans: &[Span], time: 
             ));
         }
     }
-    for curve in panel.curves {
-        path(
-            out,
-            curve,
-            &polyline(trace(samples, time, &value, |s| s.value(curve.signal)).iter()),
-        );
+    for curve in &panel.curves {
+        let points = thin(&trace(&curve.points, time, &value));
+        path(out, curve.ink, &polyline(points.iter()));
     }
 }
 
@@ -339,11 +458,12 @@ fn legend(out: &mut Svg, panel: &Panel, right: f64, y: f64) {
         .curves
         .iter()
         .map(|curve| {
-            let sample = if curve.dashed { "- - -" } else { "——" };
-            format!(
-                "<tspan fill='{}'>{sample} {}</tspan>",
-                curve.colour, curve.name
-            )
+            let sample = match curve.ink {
+                Ink::Reference => "- - -",
+                _ => "——",
+            };
+            let (colour, name) = (curve.ink.colour(), &curve.name);
+            format!("<tspan fill='{colour}'>{sample} {name}</tspan>")
         })
         .collect();
     out.add(format_args!(
@@ -352,24 +472,21 @@ fn legend(out: &mut Svg, panel: &Panel, right: f64, y: f64) {
     ));
 }
 
-fn path(out: &mut Svg, curve: &Curve, d: &str) {
-    let dashes = if curve.dashed {
-        " stroke-dasharray='5 3'"
-    } else {
-        ""
+fn path(out: &mut Svg, ink: Ink, d: &str) {
+    let (width, dashes) = match ink {
+        Ink::Reference => ("1.4", " stroke-dasharray='5 3'"),
+        _ => ("1.6", ""),
     };
+    let colour = ink.colour();
     out.add(format_args!(
-        "<path d='{d}' fill='none' stroke='{}' stroke-width='{}' stroke-linejoin='round'{dashes}/>\n",
-        curve.colour, curve.width
+        "<path d='{d}' fill='none' stroke='{colour}' stroke-width='{width}' stroke-linejoin='round'{dashes}/>\n"
     ));
 }
 
 /// The panel's vertical axis: all its curves and zero, to the next round value.
-fn range(panel: &Panel, samples: &[Sample], top: f64) -> Axis {
-    let values = panel
-        .curves
-        .iter()
-        .flat_map(|c| samples.iter().map(|s| s.value(c.signal)));
+fn range(panel: &Panel, top: f64) -> Axis {
+    let points = panel.curves.iter().flat_map(|c| &c.points);
+    let values = points.map(|(_, value)| *value);
     let (low, high) = values.fold((0.0, 0.0), |(low, high): (f64, f64), v| {
         (low.min(v), high.max(v))
     });
@@ -383,20 +500,15 @@ fn range(panel: &Panel, samples: &[Sample], top: f64) -> Axis {
     }
 }
 
-/// The points of a curve, no more than the eye can tell apart, and no peak lost.
-fn trace(
-    samples: &[Sample],
-    time: &Axis,
-    value: &Axis,
-    of: impl Fn(&Sample) -> f64,
-) -> Vec<(f64, f64)> {
-    let point = |s: &Sample| (time.at(s.t_s), value.at(of(s)));
-    samples
-        .chunks(samples.len().div_ceil(COLUMNS).max(1))
+/// The points of a curve in the drawing, no more than the eye can tell apart, and no peak lost.
+fn trace(points: &[(f64, f64)], time: &Axis, value: &Axis) -> Points {
+    let point = |(t, v): &(f64, f64)| (time.at(*t), value.at(*v));
+    points
+        .chunks(points.len().div_ceil(COLUMNS).max(1))
         .flat_map(|column| {
             let extreme = |sign: f64| {
                 (0..column.len())
-                    .max_by(|&i, &j| (sign * of(&column[i])).total_cmp(&(sign * of(&column[j]))))
+                    .max_by(|&i, &j| (sign * column[i].1).total_cmp(&(sign * column[j].1)))
             };
             let mut kept: Vec<_> = extreme(-1.0).into_iter().chain(extreme(1.0)).collect();
             kept.sort_unstable();
@@ -406,6 +518,43 @@ fn trace(
                 .collect::<Vec<_>>()
         })
         .collect()
+}
+
+/// Leaves out the points that lie on the line between those that are kept.
+///
+/// Source: D. H. Douglas, T. K. Peucker, Cartographica 10 (1973) 112.
+fn thin(points: &[(f64, f64)]) -> Points {
+    let Some(last) = points.len().checked_sub(1) else {
+        return Points::new();
+    };
+    let mut keep = vec![false; points.len()];
+    (keep[0], keep[last]) = (true, true);
+    let mut stretches = vec![(0, last)];
+    while let Some((from, to)) = stretches.pop() {
+        let off = |i: &usize| distance(points[*i], points[from], points[to]);
+        let furthest = (from + 1..to).max_by(|i, j| off(i).total_cmp(&off(j)));
+        if let Some(i) = furthest.filter(|i| off(i) > THIN) {
+            keep[i] = true;
+            stretches.extend([(from, i), (i, to)]);
+        }
+    }
+    let kept = points.iter().zip(keep).filter(|(_, keep)| *keep);
+    kept.map(|(point, _)| *point).collect()
+}
+
+/// Of a point from the stretch between two others.
+fn distance(point: (f64, f64), from: (f64, f64), to: (f64, f64)) -> f64 {
+    let (along, off) = (
+        (to.0 - from.0, to.1 - from.1),
+        (point.0 - from.0, point.1 - from.1),
+    );
+    let square = along.0 * along.0 + along.1 * along.1;
+    let share = if square > 0.0 {
+        ((off.0 * along.0 + off.1 * along.1) / square).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (off.0 - share * along.0).hypot(off.1 - share * along.1)
 }
 
 fn polyline<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> String {
@@ -470,9 +619,48 @@ mod tests {
             from: 0.0,
             to: 1.0,
         };
-        let points = trace(&samples, &time, &value, |s| s.value(&image::V_WEB));
+        let points: Points = samples
+            .iter()
+            .map(|s| (s.t_s, s.value(&image::V_WEB)))
+            .collect();
+        let points = trace(&points, &time, &value);
         assert!(points.len() <= 2 * COLUMNS);
         assert_eq!(points.iter().filter(|(_, y)| *y > 0.5).count(), 1);
+    }
+
+    /// What is left out was on the line to a tenth of a pixel; corners and ends stay.
+    #[test]
+    fn thinning_leaves_the_curve_where_it_was() {
+        let curve: Points = (0..=1000)
+            .map(|i| {
+                let x = f64::from(i);
+                (
+                    x,
+                    if i < 500 {
+                        0.3 * x
+                    } else {
+                        150.0 + 40.0 * (0.02 * x).sin()
+                    },
+                )
+            })
+            .collect();
+        let thinned = thin(&curve);
+        assert!(thinned.len() < 200, "{}", thinned.len());
+        assert_eq!((thinned[0], thinned.last()), (curve[0], curve.last()));
+        for point in &curve {
+            let off = thinned.windows(2).map(|w| distance(*point, w[0], w[1]));
+            assert!(off.fold(f64::MAX, f64::min) <= THIN, "{point:?}");
+        }
+        for n in 0..3 {
+            assert_eq!(thin(&curve[..n]), curve[..n]);
+        }
+    }
+
+    #[test]
+    fn captions_break_between_words() {
+        assert_eq!(wrap("one two  three", 7), ["one two", "three"]);
+        assert_eq!(wrap("immeasurable x", 5), ["immeasurable", "x"]);
+        assert!(wrap("", 5).is_empty());
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use host_tests::command::{demo, machine, run, signals, test};
+use host_tests::command::{demo, figures, machine, replay, run, scenario, signals, test};
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
 
@@ -29,6 +29,14 @@ enum Command {
     Run(run::Args),
     /// Install what is missing and run every test, on the host and in QEMU
     Test,
+    /// Play scenarios: timed commands, faults and what is expected, faster than real time
+    ///
+    /// Without a file, all that ship. Exit status 1: something was not as expected.
+    Scenario(scenario::Args),
+    /// Play a recording again and compare it, to the bit
+    Replay(replay::Args),
+    /// Draw the paper's figures 7 to 14 and those of the physics, each with what to compare
+    Figures(figures::Args),
     /// Run the winder alone, open loop, from a schedule of torques
     Plant(plant::Options),
     /// Print a machine as a file: every parameter with its unit, limits and description
@@ -57,6 +65,9 @@ fn run(cli: Cli) -> Result<ExitCode> {
     match cli.command {
         Command::Signals(args) => signals::main(&args),
         Command::Machine(args) => machine::main(&args),
+        Command::Scenario(args) => scenario::main(&args),
+        Command::Replay(args) => replay::main(&args),
+        Command::Figures(args) => figures::main(&args),
         Command::Plant(options) => {
             plant::run(&options, &mut std::io::stdout().lock())?;
             Ok(ExitCode::SUCCESS)

@@ -1,7 +1,10 @@
 //! The subcommands of `winder`, a module each.
 
 pub mod demo;
+pub mod figures;
 pub mod machine;
+pub mod replay;
 pub mod run;
+pub mod scenario;
 pub mod signals;
 pub mod test;

@@ -1,4 +1,6 @@
 //! The command line tool as a child process.
+// every test program uses its part of it
+#![allow(dead_code)]
 
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
