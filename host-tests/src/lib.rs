@@ -17,3 +17,4 @@ pub mod report;
 pub mod setup;
 pub mod signals;
 pub mod simulator;
+pub mod twin;
