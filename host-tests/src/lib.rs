@@ -5,6 +5,7 @@
 //! program is the command line tool `winder`: a module of [`command`] for each subcommand.
 
 pub mod command;
+pub mod flops;
 pub mod interrupt;
 pub mod link;
 pub mod log;

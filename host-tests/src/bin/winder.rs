@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use host_tests::command::{demo, machine, run, signals, test};
+use host_tests::command::{bench, demo, machine, run, signals, test};
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
 
@@ -29,6 +29,10 @@ enum Command {
     Run(run::Args),
     /// Install what is missing and run every test, on the host and in QEMU
     Test,
+    /// Count the instructions of a plant step on three microcontrollers in QEMU, and time it on this PC
+    ///
+    /// Installs and builds what is missing; what cannot be had is named, and the rest is measured.
+    Bench(bench::Args),
     /// Run the winder alone, open loop, from a schedule of torques
     Plant(plant::Options),
     /// Print a machine as a file: every parameter with its unit, limits and description
@@ -64,6 +68,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         // the others start processes, which must end with this one
         Command::Demo(args) => interrupt::install().and_then(|()| demo::main(&args)),
         Command::Run(args) => interrupt::install().and_then(|()| run::main(args)),
+        Command::Bench(args) => interrupt::install().and_then(|()| bench::main(&args)),
         Command::Test => interrupt::install().and_then(|()| test::main()),
     }
 }
