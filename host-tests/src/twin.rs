@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use model_core::fixed::Word;
 use model_core::machine::MachineError;
 use model_core::real;
 use model_core::twin::{self, Extent};
@@ -59,7 +60,11 @@ pub struct Scalar {
 }
 
 /// Every scalar; the firmware of the twin has the same list.
-pub const SCALARS: &[Scalar] = &[scalar::<f32>("f32"), scalar::<f64>("f64")];
+pub const SCALARS: &[Scalar] = &[
+    scalar::<f32>("f32"),
+    scalar::<f64>("f64"),
+    scalar::<Word>("fixed"),
+];
 
 const fn scalar<R: real::Scalar>(name: &'static str) -> Scalar {
     Scalar {

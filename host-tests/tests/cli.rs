@@ -159,7 +159,7 @@ fn bench_measures_what_it_can_and_names_the_rest() {
 fn bench_refuses_what_it_does_not_know_by_name() {
     for (arguments, said) in [
         (["bench", "--machine", "NEWS-9000"], "\"NEWS-9000\""),
-        (["bench", "--scalar", "f16"], "there are f32, f64"),
+        (["bench", "--scalar", "f16"], "there are f32, f64, fixed"),
     ] {
         let output = winder(&arguments).output().unwrap();
         assert!(!output.status.success());

@@ -8,11 +8,13 @@ use std::process::Command;
 use host_tests::setup::{self, Warnings};
 use host_tests::twin::{self, CORES, Mark, Twin};
 
-/// A whole set in the board's scalar, all phases in the other, and the simulator with regulators and logic.
-const RUNS: [[&str; 3]; 4] = [
+/// A whole set in the microcontrollers' scalars, all phases in the other, and the simulator with regulators and logic.
+const RUNS: [[&str; 3]; 6] = [
     ["wind", "f32", "set"],
+    ["wind", "fixed", "set"],
     ["wind", "f64", "short"],
     ["operate", "f32", "plc"],
+    ["operate", "fixed", "plc"],
     ["operate", "f64", "plc"],
 ];
 

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
 use model_core::drive::DRIVE_PERIOD_MS;
+use model_core::fixed::Word;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::machine::{MAX_SPANS, Machine};
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
@@ -26,7 +27,7 @@ pub struct Args {
     /// Preset; may be given several times [default: NEWS-8000 and NEWS-8000-UNLUMPED]
     #[arg(long = "machine", value_name = "NAME")]
     machines: Vec<String>,
-    /// Numbers to compute with: f32 or f64; may be given several times [default: both]
+    /// Numbers to compute with: f32, f64 or fixed; may be given several times [default: all]
     #[arg(long = "scalar", value_name = "NAME", value_parser = scalar)]
     scalars: Vec<&'static Scalar>,
 }
@@ -53,6 +54,11 @@ const SCALARS: &[Scalar] = &[
         name: "f64",
         floors: Some(flops::floors::<f64>),
         speeds: speeds::<f64>,
+    },
+    Scalar {
+        name: "fixed",
+        floors: None,
+        speeds: speeds::<Word>,
     },
 ];
 
@@ -104,7 +110,7 @@ pub fn main(args: &Args) -> Result<ExitCode> {
     let bench = Bench::prepare(&mut missing)?;
     println!(
         "# Instructions of a call in QEMU\n\n\
-         Mean, most in brackets, and the mean for each operation that is needed. QEMU has no model of cycles: a \
+         Mean, most in brackets, and the mean for each operation that floating point needs. QEMU has no model of cycles: a \
          division counts as a move does.\n"
     );
     for (name, machine) in &machines {

@@ -19,6 +19,7 @@ mod marks;
 mod system;
 
 use cortex_m_semihosting::{debug, hprintln};
+use model_core::fixed::Word;
 use model_core::real::Scalar;
 use model_core::twin::{self, Extent};
 
@@ -30,7 +31,11 @@ struct Runs {
 }
 
 /// Every scalar by its name.
-const SCALARS: &[(&str, Runs)] = &[("f32", runs::<f32>()), ("f64", runs::<f64>())];
+const SCALARS: &[(&str, Runs)] = &[
+    ("f32", runs::<f32>()),
+    ("f64", runs::<f64>()),
+    ("fixed", runs::<Word>()),
+];
 
 const fn runs<R: Scalar>() -> Runs {
     Runs {
