@@ -24,7 +24,7 @@ use model_core::real::{
     Accumulator, Arithmetic, Compensated, Float, Plain, Real, Ring, Scalar, Sum,
 };
 use model_core::simulator::{Plant, logic_tick};
-use model_core::twin::{self, Course, Extent};
+use model_core::twin::{self, Course, Extent, Moving};
 
 /// A floating-point number that can be traced.
 pub trait Number: Float {
@@ -560,6 +560,7 @@ fn floors_with<N: Number, const SPANS: usize>(
     machine: &Machine,
 ) -> Result<BTreeMap<&'static str, Floor>> {
     let mut floors = BTreeMap::new();
+    floors.extend(motion::<N, SPANS>(machine).floors());
     floors.extend(drive::<N, SPANS>(machine)?.floors());
     floors.extend(plant::<N, SPANS>(machine)?.floors());
     let mut machine = machine.clone();
@@ -572,6 +573,23 @@ fn measured<N: Number>(m: &Measurements<Traced<N>>) -> Vec<Traced<N>> {
     let mut numbers = m.omega.into_array().to_vec();
     numbers.extend([m.tension, m.d_wu]);
     numbers
+}
+
+/// The motion alone.
+fn motion<N: Number, const SPANS: usize>(machine: &Machine) -> Recorder {
+    let mut moving = Moving::<Traced<N>, SPANS>::of(machine);
+    let mut recorder = Recorder::default();
+    for _ in 0..WINDOW {
+        recorder.call(
+            || {
+                moving.step();
+                moving.values()
+            },
+            |_| "motion",
+            |state| state.iter().collect(),
+        );
+    }
+    recorder
 }
 
 /// The plant alone, through its short course.

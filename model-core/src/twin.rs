@@ -15,8 +15,13 @@ use crate::image::{self, Commands, Feedback, Image};
 use crate::logic::command;
 use crate::machine::{IdleRoll, Machine, MachineError};
 use crate::plant::PLANT_PERIOD_MS;
+use crate::plant::motion::{Load, Motion};
+use crate::plant::rk4::State;
+use crate::plant::span::Web;
+use crate::plant::units::{One, Units};
+use crate::plant::windup::Whole;
 use crate::profidrive::stw1;
-use crate::real::{Real, Scalar};
+use crate::real::{Accumulator, Real, Scalar};
 use crate::simulator::{Plant, Record, Simulator};
 
 /// Coefficient of friction of a worn drum on paper.
@@ -366,6 +371,68 @@ fn balance(machine: &Machine, point: Point, a: f64, tension: f64) -> BySection<f
     }
 }
 
+/// The motion alone, at run speed in the middle of a set: nothing is decided on, so that its arithmetic can be counted.
+#[derive(Clone, Debug)]
+pub struct Moving<R: Scalar, const SPANS: usize> {
+    motion: Motion<R, SPANS>,
+    sums: State<R::Sum, SPANS, 0>,
+    web: Web<R, SPANS>,
+    load: Load<R, Whole<R>, SPANS>,
+}
+
+impl<R: Scalar, const SPANS: usize> Moving<R, SPANS> {
+    /// The motion of a machine with `SPANS` spans under its web tension, in steps of the plant's period.
+    pub fn of(machine: &Machine) -> Self {
+        let h = 1e-3 * f64::from(PLANT_PERIOD_MS);
+        let o = &machine.operation;
+        let (tension, v) = (o.tension_n_m * machine.web.width_m, o.run_speed_m_s);
+        let length = 0.5 * set_length(machine);
+        let r_uw = parent_radius(machine, length);
+        let torque = balance(machine, Point { length, v }, 0.0, tension);
+        let force =
+            torque.rd / machine.rear_drum.radius_m + torque.fd / machine.front_drum.radius_m;
+
+        let units = Units::of::<R>(machine, h);
+        let motion = Motion::new(&One(machine, &units), h);
+        let at = |x: f64, unit: f64| R::Sum::at(R::coefficient(x / unit));
+        let strain = tension / (machine.web.stiffness_n_m * machine.web.width_m);
+        let sums = State {
+            strain: core::array::from_fn(|_| at(strain, units.strain)),
+            v: core::array::from_fn(|_| at(v, units.speed)),
+            windup: [],
+            omega_uw: at(v / r_uw, units.omega()),
+            r_uw: at(r_uw, units.r_uw),
+            r_wu: at(shipping_radius(machine, length), units.r_wu),
+            travel: at(0.0, units.travel),
+        };
+        let web = motion.web(&sums.map(|sum| sum.value()), &None);
+        Self {
+            motion,
+            sums,
+            web,
+            load: Load {
+                uw: R::coefficient(torque.uw / units.torque()),
+                windup: Whole(R::coefficient(force / units.force)),
+                layer: R::coefficient(1.0),
+                threaded: true,
+                offsets: None,
+            },
+        }
+    }
+
+    /// A step, and the web that belongs to its end.
+    pub fn step(&mut self) {
+        self.sums.travel = R::Sum::at(R::ZERO);
+        self.motion.advance(&mut self.sums, &self.web, &self.load);
+        self.web = self.motion.web(&self.values(), &None);
+    }
+
+    /// The state, counted in the scalar's units.
+    pub fn values(&self) -> State<R, SPANS, 0> {
+        self.sums.map(|sum| sum.value())
+    }
+}
+
 /// Drive cycles of the run under a PLC.
 pub const CYCLES: u32 = 60 * 1000 / DRIVE_PERIOD_MS;
 
@@ -456,6 +523,23 @@ mod tests {
             assert_eq!(course.rows.len(), ROWS);
             assert_eq!(course.rows.last().map(|row| row.phase), Some(Phase::Coast));
         }
+    }
+
+    /// What is counted is a winder at work: it keeps its speed, and its web is tight.
+    #[test]
+    fn the_motion_alone_goes_on_as_it_began() {
+        let machine = Machine::news_8000();
+        let mut moving = Moving::<f64, SPANS>::of(&machine);
+        let before = moving.values();
+        for _ in 0..250 {
+            moving.step();
+        }
+        let after = moving.values();
+        for (v, v_before) in after.v.into_iter().zip(before.v) {
+            assert!((v - v_before).abs() < 0.1, "{v} m/s after {v_before} m/s");
+        }
+        assert!(after.strain.iter().all(|strain| *strain > 0.0), "{after:?}");
+        assert!(after.r_wu > before.r_wu && after.r_uw < before.r_uw);
     }
 
     /// The PLC's commands come when they are taken: the set is at speed, and at the end it is stopped under tension.

@@ -78,7 +78,8 @@ fn scalar(name: &str) -> Result<&'static Scalar> {
 const MACHINES: [&str; 2] = ["NEWS-8000", "NEWS-8000-UNLUMPED"];
 
 /// The parts of the simulator, as the twin's sections are called.
-const PARTS: [(&str, &str); 7] = [
+const PARTS: [(&str, &str); 8] = [
+    ("motion", "motion alone"),
     ("smooth", "plant step"),
     ("braked", "… with brakes"),
     ("gripping", "… with nips that may slip"),
@@ -217,7 +218,7 @@ fn cell(sections: Option<&[Section]>, name: &str, floor: Option<&Floor>) -> Stri
     };
     let mut text = format!("{:.0} ({})", section.mean, section.max);
     if let Some(floor) = floor {
-        text += &format!(" {:.2}", section.mean / floor.needed.total());
+        text += &format!(", {:.2}×", section.mean / floor.needed.total());
     }
     text
 }

@@ -12,10 +12,13 @@ use model_core::machine::{MAX_SPANS, Machine};
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
 use model_core::real::Scalar;
 use model_core::simulator::{Plant, logic_tick};
-use model_core::twin::{self, Course, Extent};
+use model_core::twin::{self, Course, Extent, Moving};
 
 use crate::Error;
 use crate::marks::*;
+
+/// Steps of the motion alone: one would do where nothing is decided on, and more show that it is so.
+const STEPS: usize = 1000;
 
 /// Counts what a preset takes: its course without and with slip, and the whole simulator.
 pub fn count<R: Scalar>(name: &str) -> Result<(), Error> {
@@ -31,10 +34,23 @@ pub fn count<R: Scalar>(name: &str) -> Result<(), Error> {
 }
 
 fn count_with<R: Scalar, const SPANS: usize>(mut machine: Machine) -> Result<(), Error> {
+    motion::<R, SPANS>(&machine);
     simulator::<R, SPANS>(&machine)?;
     plant::<R, SPANS>(&machine)?;
     twin::may_slip(&mut machine);
     plant::<R, SPANS>(&machine)
+}
+
+/// The motion alone: its arithmetic, the same in every step.
+fn motion<R: Scalar, const SPANS: usize>(machine: &Machine) {
+    let mut moving = Moving::<R, SPANS>::of(machine);
+    for _ in 0..STEPS {
+        let moving = black_box(&mut moving);
+        count_begin();
+        moving.step();
+        count_end();
+        count_as_motion();
+    }
 }
 
 /// The plant alone, through its short course.

@@ -28,6 +28,8 @@ marks! {
     count_end;
     /// It was empty: what the marks themselves take.
     count_as_nothing;
+    /// A step of the motion alone.
+    count_as_motion;
     /// A step of the plant, the windup as one body, without brakes.
     count_as_smooth;
     /// The same with brakes.
