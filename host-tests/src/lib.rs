@@ -7,6 +7,7 @@
 pub mod command;
 pub mod figures;
 pub mod handbook;
+pub mod flops;
 pub mod interrupt;
 pub mod link;
 pub mod log;
@@ -20,3 +21,4 @@ pub mod scenario;
 pub mod setup;
 pub mod signals;
 pub mod simulator;
+pub mod twin;

@@ -163,7 +163,7 @@ fn command(files: &Mps2, port: u16, pace: f64) -> Command {
 }
 
 /// A path within a list of QEMU options: a comma is doubled.
-fn escaped(path: &Path) -> String {
+pub(crate) fn escaped(path: &Path) -> String {
     path.display().to_string().replace(',', ",,")
 }
 

@@ -16,8 +16,10 @@ use crate::interrupt;
 
 /// The emulator.
 pub const QEMU: &str = "qemu-system-arm";
-/// The microcontroller's target.
+/// The microcontroller's target: a core with a floating-point unit.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
+/// The target of a core without.
+pub const TARGET_SOFT: &str = "thumbv7m-none-eabi";
 
 /// What QEMU needs to run the simulator.
 #[derive(Clone, Debug)]
@@ -47,7 +49,7 @@ pub enum Warnings {
 /// As [`mps2`].
 pub fn mps2_with(warnings: Warnings) -> Result<Mps2> {
     let qemu = qemu()?;
-    target()?;
+    target(TARGET)?;
     let package = ["build", "--release", "-p"];
     let firmware = [&package[..], &["board-mps2", "--target", TARGET]].concat();
     build("the firmware", &firmware, warnings)?;
@@ -58,6 +60,45 @@ pub fn mps2_with(warnings: Warnings) -> Result<Mps2> {
         firmware: built(&[TARGET, "release", "board-mps2"])?,
         plugin: built(&["release", "libqemu_pace.so"])?,
     })
+}
+
+/// The model alone for a target: an ELF file, built where it is not up to date.
+pub fn twin(target: &str, warnings: Warnings) -> Result<PathBuf> {
+    self::target(target)?;
+    let package = ["build", "--release", "-p", "board-mps2-twin", "--target"];
+    let what = format!("the model alone for {target}");
+    build(&what, &[&package[..], &[target]].concat(), warnings)?;
+    built(&[target, "release", "board-mps2-twin"])
+}
+
+/// The QEMU plugin that counts instructions, built where it is not up to date.
+pub fn counter(warnings: Warnings) -> Result<PathBuf> {
+    let package = ["build", "--release", "-p", "qemu-count"];
+    build(
+        "the QEMU plugin that counts instructions",
+        &package,
+        warnings,
+    )?;
+    built(&["release", "libqemu_count.so"])
+}
+
+/// The model alone on this PC as a development build makes it: a program, built where it is not up to date.
+pub fn development_twin() -> Result<PathBuf> {
+    let package = ["build", "-p", "host-tests", "--example", "twin"];
+    build(
+        "the development build of the model for this PC",
+        &package,
+        Warnings::Shown,
+    )?;
+    built(&["debug", "examples", "twin"])
+}
+
+/// A file for what a tool has to say, beside what cargo has built.
+pub fn scratch(name: &str) -> Result<PathBuf> {
+    let dir = target_dir().join("winder");
+    std::fs::create_dir_all(&dir)
+        .with_context(|| format!("cannot make the directory {}", dir.display()))?;
+    Ok(dir.join(name))
 }
 
 /// The emulator, installed with apt where it is missing.
@@ -103,22 +144,22 @@ pub fn qemu() -> Result<PathBuf> {
         .with_context(|| format!("apt-get has installed {QEMU}, but it is not on the PATH"))
 }
 
-/// The Rust target of the microcontroller, installed with rustup where it is missing.
-pub fn target() -> Result<()> {
-    if has_target() {
+/// A Rust target of the microcontrollers, installed with rustup where it is missing.
+pub fn target(target: &str) -> Result<()> {
+    if has_target(target) {
         return Ok(());
     }
-    step(&format!("installing the Rust target {TARGET} (rustup)"));
-    let added = run(Command::new("rustup").args(["target", "add", TARGET]));
+    step(&format!("installing the Rust target {target} (rustup)"));
+    let added = run(Command::new("rustup").args(["target", "add", target]));
     interrupt::check()?;
     added
         .and_then(|()| {
-            ensure!(has_target(), "rustup has installed it for another toolchain than `rustc`'s");
+            ensure!(has_target(target), "rustup has installed it for another toolchain than `rustc`'s");
             Ok(())
         })
         .with_context(|| {
             format!(
-                "the Rust target {TARGET} is missing: `rustup target add {TARGET}` brings it where there is rustup \
+                "the Rust target {target} is missing: `rustup target add {target}` brings it where there is rustup \
                  and a network; elsewhere, name a toolchain that has it in the environment variable \
                  RUSTUP_TOOLCHAIN; then run this again"
             )
@@ -126,9 +167,9 @@ pub fn target() -> Result<()> {
     Ok(())
 }
 
-fn has_target() -> bool {
+fn has_target(target: &str) -> bool {
     let output = Command::new("rustc")
-        .args(["--print", "target-libdir", "--target", TARGET])
+        .args(["--print", "target-libdir", "--target", target])
         .current_dir(root())
         .stderr(Stdio::null())
         .output();
@@ -224,9 +265,14 @@ fn root() -> &'static Path {
     package.parent().unwrap_or(package)
 }
 
-fn built(parts: &[&str]) -> Result<PathBuf> {
+/// Where cargo builds.
+fn target_dir() -> PathBuf {
     let target = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
-    let path = root().join(target).join(parts.iter().collect::<PathBuf>());
+    root().join(target)
+}
+
+fn built(parts: &[&str]) -> Result<PathBuf> {
+    let path = target_dir().join(parts.iter().collect::<PathBuf>());
     ensure!(
         path.is_file(),
         "cargo has built, but there is no {}",

@@ -136,3 +136,34 @@ fn the_list_of_machines_names_every_preset() {
     let names = list.lines().filter_map(|line| line.split(' ').next());
     assert!(names.eq(model_core::machine::PRESETS.iter().map(|(name, _)| *name)));
 }
+
+/// Without a toolchain there are no instructions to count: that is said, and this PC is measured all the same.
+#[test]
+fn bench_measures_what_it_can_and_names_the_rest() {
+    let arguments = ["bench", "--machine", "NEWS-8000", "--scalar", "f32"];
+    let output = winder(&arguments).env("PATH", "").output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("\nNot measured: instructions: "), "{said}");
+    let row = |begin: &str| said.lines().find(|line| line.starts_with(begin));
+    let step = row("| plant step |").expect("the operations need no QEMU");
+    assert!(step.ends_with("| – | – | – |"), "{step}");
+    let speed = row("| NEWS-8000 | f32 |").expect("a speed");
+    let speeds = speed
+        .split('|')
+        .filter_map(|cell| cell.trim().parse::<f64>().ok());
+    assert_eq!(speeds.filter(|speed| *speed > 0.0).count(), 2, "{speed}");
+}
+
+#[test]
+fn bench_refuses_what_it_does_not_know_by_name() {
+    for (arguments, said) in [
+        (["bench", "--machine", "NEWS-9000"], "\"NEWS-9000\""),
+        (["bench", "--scalar", "f16"], "there are f32, f64, fixed"),
+    ] {
+        let output = winder(&arguments).output().unwrap();
+        assert!(!output.status.success());
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(error.contains(said), "{error}");
+    }
+}

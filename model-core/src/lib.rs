@@ -20,3 +20,4 @@ pub mod profidrive;
 pub mod real;
 pub mod signal;
 pub mod simulator;
+pub mod twin;

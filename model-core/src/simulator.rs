@@ -65,7 +65,8 @@ impl Record {
     /// FNV-1a's prime.
     const PRIME: u32 = 0x0100_0193;
 
-    fn step(&mut self, variables: impl Iterator<Item = u32>) {
+    /// A step, with all that it has left behind.
+    pub(crate) fn step(&mut self, variables: impl Iterator<Item = u32>) {
         self.ticks = self.ticks.wrapping_add(1);
         for bits in variables {
             self.trajectory = (self.trajectory ^ bits).wrapping_mul(Self::PRIME);

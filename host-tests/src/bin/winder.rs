@@ -4,7 +4,9 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use host_tests::command::{demo, figures, machine, replay, run, scenario, signals, test};
+use host_tests::command::{
+    bench, demo, figures, machine, replay, run, scenario, signals, test,
+};
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
 
@@ -37,6 +39,10 @@ enum Command {
     Replay(replay::Args),
     /// Draw the paper's figures 7 to 14 and those of the physics, each with what to compare
     Figures(figures::Args),
+    /// Count the instructions of a plant step on three microcontrollers in QEMU, and time it on this PC
+    ///
+    /// Installs and builds what is missing; what cannot be had is named, and the rest is measured.
+    Bench(bench::Args),
     /// Run the winder alone, open loop, from a schedule of torques
     Plant(plant::Options),
     /// Print a machine as a file: every parameter with its unit, limits and description
@@ -75,6 +81,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         // the others start processes, which must end with this one
         Command::Demo(args) => interrupt::install().and_then(|()| demo::main(&args)),
         Command::Run(args) => interrupt::install().and_then(|()| run::main(args)),
+        Command::Bench(args) => interrupt::install().and_then(|()| bench::main(&args)),
         Command::Test => interrupt::install().and_then(|()| test::main()),
     }
 }

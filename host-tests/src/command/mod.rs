@@ -1,5 +1,6 @@
 //! The subcommands of `winder`, a module each.
 
+pub mod bench;
 pub mod demo;
 pub mod figures;
 pub mod machine;

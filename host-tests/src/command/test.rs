@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use crate::interrupt;
 use crate::report::minutes;
-use crate::setup::{self, Warnings};
+use crate::setup::{self, TARGET, TARGET_SOFT, Warnings};
 
 type Stage = (&'static str, fn() -> Result<()>);
 
@@ -18,7 +18,10 @@ pub fn main() -> Result<ExitCode> {
         ("lints", lints),
         ("host tests", || cargo(&["test"])),
         ("firmware builds without warnings", || {
-            setup::mps2_with(Warnings::Denied).map(drop)
+            setup::mps2_with(Warnings::Denied)?;
+            setup::counter(Warnings::Denied)?;
+            setup::twin(TARGET, Warnings::Denied)?;
+            setup::twin(TARGET_SOFT, Warnings::Denied).map(drop)
         }),
         ("QEMU end to end", || {
             cargo(&[
@@ -30,12 +33,15 @@ pub fn main() -> Result<ExitCode> {
                 "qemu",
                 "--test",
                 "qemu",
+                "--test",
+                "twin",
             ])
         }),
     ];
     // what needs the network first: better no start than a late stop
     setup::qemu()?;
-    setup::target()?;
+    setup::target(TARGET)?;
+    setup::target(TARGET_SOFT)?;
     let began = Instant::now();
     let mut failed = Vec::new();
     let mut summary = String::new();
@@ -79,8 +85,10 @@ fn lints() -> Result<()> {
         "--release",
         "-p",
         "board-mps2",
+        "-p",
+        "board-mps2-twin",
         "--target",
-        setup::TARGET,
+        TARGET,
     ];
     cargo(&[&firmware[..], &["--", "-D", "warnings"]].concat())?;
     cargo(&[
@@ -88,6 +96,10 @@ fn lints() -> Result<()> {
         "--release",
         "-p",
         "qemu-pace",
+        "-p",
+        "qemu-count",
+        "-p",
+        "qemu-plugin",
         "--",
         "-D",
         "warnings",
