@@ -6,8 +6,8 @@
 
 pub mod command;
 pub mod figures;
-pub mod handbook;
 pub mod flops;
+pub mod handbook;
 pub mod interrupt;
 pub mod link;
 pub mod log;

@@ -303,6 +303,7 @@ impl Course {
                     thread_web: row.phase == Phase::TakeUp,
                     ..Handling::default()
                 },
+                ..Actuators::default()
             };
             (0..row.steps).map(move |_| (row.phase, actuators))
         })
@@ -377,7 +378,7 @@ pub struct Moving<R: Scalar, const SPANS: usize> {
     motion: Motion<R, SPANS>,
     sums: State<R::Sum, SPANS, 0>,
     web: Web<R, SPANS>,
-    load: Load<R, Whole<R>, SPANS>,
+    load: Load<'static, R, Whole<R>, SPANS>,
 }
 
 impl<R: Scalar, const SPANS: usize> Moving<R, SPANS> {
@@ -405,7 +406,7 @@ impl<R: Scalar, const SPANS: usize> Moving<R, SPANS> {
             r_wu: at(shipping_radius(machine, length), units.r_wu),
             travel: at(0.0, units.travel),
         };
-        let web = motion.web(&sums.map(|sum| sum.value()), &None);
+        let web = motion.web(&sums.map(|sum| sum.value()), None);
         Self {
             motion,
             sums,
@@ -424,7 +425,7 @@ impl<R: Scalar, const SPANS: usize> Moving<R, SPANS> {
     pub fn step(&mut self) {
         self.sums.travel = R::Sum::at(R::ZERO);
         self.motion.advance(&mut self.sums, &self.web, &self.load);
-        self.web = self.motion.web(&self.values(), &None);
+        self.web = self.motion.web(&self.values(), None);
     }
 
     /// The state, counted in the scalar's units.

@@ -4,9 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use host_tests::command::{
-    bench, demo, figures, machine, replay, run, scenario, signals, test,
-};
+use host_tests::command::{bench, demo, figures, machine, replay, run, scenario, signals, test};
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
 

@@ -154,6 +154,10 @@ impl<R: Real> Brake<R> {
 #[derive(Clone, Copy, Debug)]
 pub struct Delay {
     steps: u32,
+    /// The signal of the last step, and how many steps in a row it has been so.
+    last: bool,
+    steady: u32,
+    /// The signal of the steps before, the last one lowest; kept only while it is not steady.
     history: u128,
 }
 
@@ -163,12 +167,22 @@ impl Delay {
         let steps = delay_s.clamp(0.0, MAX_BRAKE_DELAY_S) / h + 0.5;
         Self {
             steps: (steps as u32).min(u128::BITS - 1),
+            last: false,
+            steady: u128::BITS,
             history: 0,
         }
     }
 
     /// Takes the signal of this step, gives the one of `delay_s` ago.
     pub fn step(&mut self, on: bool) -> bool {
+        if on == self.last && self.steady > self.steps {
+            return on;
+        }
+        if self.steady > self.steps {
+            self.history = if self.last { u128::MAX } else { 0 };
+        }
+        self.steady = if on == self.last { self.steady + 1 } else { 1 };
+        self.last = on;
         self.history = self.history << 1 | u128::from(on);
         self.history >> self.steps & 1 == 1
     }

@@ -265,7 +265,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             self.nips = v.rolls.map(|roll| Nip::between(roll, v.wu));
         }
         if self.threaded {
-            self.look_at_web(&None);
+            self.look_at_web(None);
         }
     }
 
@@ -328,10 +328,10 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         self.threaded = true;
         self.broken_span = 0;
         self.state.strain = [R::Sum::at(strain); SPANS];
-        self.look_at_web(&None);
+        self.look_at_web(None);
     }
 
-    fn look_at_web(&mut self, offsets: &Option<Offsets<R, SPANS>>) {
+    fn look_at_web(&mut self, offsets: Option<&Offsets<R, SPANS>>) {
         let x = self.state.map(|sum| sum.value());
         self.web = self.motion.web(&x, offsets);
     }
@@ -348,10 +348,10 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
 
     /// Moves everything by a step of integration, the friction of brakes and nips as it found it.
     fn advance(&mut self, actuators: &Actuators<R::Si>) {
-        let before = self.state.map(|sum| sum.value());
+        let radii = [self.state.r_uw, self.state.r_wu];
         let offsets = self.turn_eccentric_rolls();
         if self.threaded && offsets.is_some() {
-            self.web = self.motion.web(&before, &offsets);
+            self.look_at_web(offsets.as_ref());
         }
         let layer = if !self.threaded {
             R::ZERO
@@ -368,7 +368,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             windup: (),
             layer,
             threaded: self.threaded,
-            offsets,
+            offsets: offsets.as_ref(),
         };
         if self.holders.winds() || self.closed.rd || self.closed.fd {
             self.turn_held_windup(&actuators.torque, &load);
@@ -379,9 +379,9 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         if unwind.sticks {
             self.state.omega_uw = R::Sum::at(R::ZERO);
         }
-        self.stop_wreck(&before);
+        self.stop_wreck(radii);
         if self.threaded {
-            self.look_at_web(&load.offsets);
+            self.look_at_web(offsets.as_ref());
         }
     }
 
@@ -503,14 +503,13 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
 
     /// A step so violent that its numbers overflow leaves a wreck: the web torn, the machine at standstill, the
     /// rolls as they were. So the state stays finite whatever the motors do.
-    fn stop_wreck(&mut self, before: &State<R, SPANS, 0>) {
+    fn stop_wreck(&mut self, [r_uw, r_wu]: [R::Sum; 2]) {
         let whole = R::sound(self.state.map(|sum| sum.value()).iter());
         if whole && (!self.holders.slips || R::sound(self.apart.iter().map(|sum| sum.value()))) {
             return;
         }
-        self.state = before.map(|_| R::Sum::at(R::ZERO));
-        self.state.r_uw = R::Sum::at(before.r_uw);
-        self.state.r_wu = R::Sum::at(before.r_wu);
+        self.state = self.state.map(|_| R::Sum::at(R::ZERO));
+        (self.state.r_uw, self.state.r_wu) = (r_uw, r_wu);
         self.apart = [R::Sum::at(R::ZERO); ROLLS];
         self.nips = [Nip::Sticks; ROLLS];
         self.break_web();
@@ -561,10 +560,13 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             travel: x.travel.value().to_si(scale.travel),
             r_wu: x.r_wu.value().to_si(scale.r_wu),
         };
-        let tension = self.tension();
+        let t = self
+            .sensors
+            .spans()
+            .map(|span| self.web.tension[span].to_si(scale.force));
         Measurements {
             brakes: self.closed,
-            ..self.sensors.look(&sight, &tension, faults)
+            ..self.sensors.look(&sight, t, faults)
         }
     }
 }

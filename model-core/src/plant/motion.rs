@@ -5,7 +5,7 @@
 //! go through it side by side.
 
 use super::eccentricity::Offsets;
-use super::rk4::{self, State};
+use super::rk4::{self, State, System};
 use super::roll::{Idle, Unwind};
 use super::span::{Spans, Web};
 use super::units::Machines;
@@ -25,7 +25,7 @@ pub struct Motion<A: Arithmetic, const SPANS: usize> {
 
 /// What drives the winder, constant over a step.
 #[derive(Clone, Copy, Debug)]
-pub struct Load<A, W, const SPANS: usize> {
+pub struct Load<'a, A, W, const SPANS: usize> {
     /// Torque on the parent roll less its brake's, N·m.
     pub uw: A,
     /// On the windup.
@@ -35,12 +35,12 @@ pub struct Load<A, W, const SPANS: usize> {
     /// There is a web.
     pub threaded: bool,
     /// Where rolls are eccentric.
-    pub offsets: Option<Offsets<A, SPANS>>,
+    pub offsets: Option<&'a Offsets<A, SPANS>>,
 }
 
-impl<A: Copy, const SPANS: usize> Load<A, (), SPANS> {
+impl<'a, A: Copy, const SPANS: usize> Load<'a, A, (), SPANS> {
     /// The same with what acts on the windup.
-    pub fn on<W>(&self, windup: W) -> Load<A, W, SPANS> {
+    pub fn on<W>(&self, windup: W) -> Load<'a, A, W, SPANS> {
         Load {
             uw: self.uw,
             windup,
@@ -67,7 +67,7 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
     pub fn web<const APART: usize>(
         &self,
         x: &State<A, SPANS, APART>,
-        offsets: &Option<Offsets<A, SPANS>>,
+        offsets: Option<&Offsets<A, SPANS>>,
     ) -> Web<A, SPANS> {
         let v_uw = x.omega_uw * x.r_uw;
         match offsets {
@@ -88,14 +88,7 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
         load: &Load<A, W, SPANS>,
     ) {
         let k1 = self.rates(&sums.map(|sum| sum.value()), web, load);
-        rk4::advance(sums, k1, |x| {
-            let web = if load.threaded {
-                self.web(x, &load.offsets)
-            } else {
-                Web::none()
-            };
-            self.rates(x, &web, load)
-        });
+        rk4::advance(sums, k1, &Loaded { motion: self, load });
     }
 
     #[inline(always)]
@@ -126,5 +119,25 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
             r_wu: roll.radius_rate,
             travel: windup.way(v_rd),
         }
+    }
+}
+
+/// The winder under loads that are held.
+struct Loaded<'a, A: Arithmetic, W, const SPANS: usize> {
+    motion: &'a Motion<A, SPANS>,
+    load: &'a Load<'a, A, W, SPANS>,
+}
+
+impl<A: Arithmetic, W: windup::Load<A, APART>, const SPANS: usize, const APART: usize>
+    System<A, SPANS, APART> for Loaded<'_, A, W, SPANS>
+{
+    #[inline(always)]
+    fn rates(&self, x: &State<A, SPANS, APART>) -> State<A::Rate, SPANS, APART> {
+        let web = if self.load.threaded {
+            self.motion.web(x, self.load.offsets)
+        } else {
+            Web::none()
+        };
+        self.motion.rates(x, &web, self.load)
     }
 }

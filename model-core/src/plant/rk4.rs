@@ -80,17 +80,23 @@ impl<T: Copy, const SPANS: usize, const APART: usize> State<T, SPANS, APART> {
     }
 }
 
+/// A system of differential equations.
+pub trait System<A: Arithmetic, const SPANS: usize, const APART: usize> {
+    /// Rates of all variables in a state, for a sixth of the step.
+    fn rates(&self, x: &State<A, SPANS, APART>) -> State<A::Rate, SPANS, APART>;
+}
+
 /// Advances the sums by x(t + h) = x + h/6·(k1 + 2·k2 + 2·k3 + k4), with `k1` the rates at the start; rates come for a
 /// sixth of the step.
 #[inline(always)]
 pub fn advance<A: Arithmetic, const SPANS: usize, const APART: usize>(
     sums: &mut State<A::Sum, SPANS, APART>,
     k1: State<A::Rate, SPANS, APART>,
-    rates: impl Fn(&State<A, SPANS, APART>) -> State<A::Rate, SPANS, APART>,
+    system: &impl System<A, SPANS, APART>,
 ) {
-    let k2 = rates(&sums.zip(&k1, |sum, k| sum.after_half(k)));
-    let k3 = rates(&sums.zip(&k2, |sum, k| sum.after_half(k)));
-    let k4 = rates(&sums.zip(&k3, |sum, k| sum.after_whole(k)));
+    let k2 = system.rates(&sums.zip(&k1, |sum, k| sum.after_half(k)));
+    let k3 = system.rates(&sums.zip(&k2, |sum, k| sum.after_half(k)));
+    let k4 = system.rates(&sums.zip(&k3, |sum, k| sum.after_whole(k)));
     let outer = k1.zip(&k4, |a, b| a + b);
     let inner = k2.zip(&k3, |a, b| a + b);
     let change = outer.zip(&inner, |outer, inner| outer + (inner + inner));

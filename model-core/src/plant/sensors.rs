@@ -95,17 +95,24 @@ impl<R: Real> Sensors<R> {
         }
     }
 
-    /// One look, every step of the plant.
+    /// The spans before and after the roll on the load cells, counted from 0.
+    pub fn spans(&self) -> [usize; 2] {
+        let roll = self.coefficients.load_cell_roll;
+        [roll, roll + 1]
+    }
+
+    /// One look, every step of the plant, with the tensions of [`Sensors::spans`].
     ///
     /// The load cells carry F = (t_before + t_after)·sin(β/2) + tare and show F/(2·sin(β_cal/2)), filtered. Where
     /// they do not feel both spans, t_after stands for t_before. A drift adds to the tare as time goes.
-    pub fn look<const SPANS: usize>(
+    #[inline]
+    pub fn look(
         &mut self,
         sight: &Sight<R>,
-        tension: &[R; SPANS],
+        tensions: [R; 2],
         faults: &SensorFaults<R>,
     ) -> Measurements<R> {
-        self.weigh(tension, faults);
+        self.weigh(tensions, faults);
         let [rd, fd, rr] = sight.v;
         let c = &self.coefficients;
         let heard = |silent: bool, omega: R| if silent { R::ZERO } else { omega };
@@ -127,7 +134,7 @@ impl<R: Real> Sensors<R> {
         }
     }
 
-    fn weigh<const SPANS: usize>(&mut self, tension: &[R; SPANS], faults: &SensorFaults<R>) {
+    fn weigh(&mut self, [before, after]: [R; 2], faults: &SensorFaults<R>) {
         let c = &self.coefficients;
         if faults.wrap_error != self.wrap_error {
             self.wrap_error = faults.wrap_error;
@@ -142,7 +149,7 @@ impl<R: Real> Sensors<R> {
         if faults.load_cell_stuck {
             return;
         }
-        let felt = c.before * tension[c.load_cell_roll] + c.after * tension[c.load_cell_roll + 1];
+        let felt = c.before * before + c.after * after;
         let shown = self.gain * felt + c.zero + self.wandered;
         self.tension += c.filter * (shown - self.tension);
     }
