@@ -50,14 +50,12 @@ pub enum Warnings {
 pub fn mps2_with(warnings: Warnings) -> Result<Mps2> {
     let qemu = qemu()?;
     target(TARGET)?;
-    let package = ["build", "--release", "-p"];
-    let firmware = [&package[..], &["board-mps2", "--target", TARGET]].concat();
-    build("the firmware", &firmware, warnings)?;
-    let plugin = [&package[..], &["qemu-pace"]].concat();
+    let firmware = firmware("board-mps2", "the firmware", TARGET, warnings)?;
+    let plugin = ["build", "--release", "-p", "qemu-pace"];
     build("the QEMU plugin that keeps time", &plugin, warnings)?;
     Ok(Mps2 {
         qemu,
-        firmware: built(&[TARGET, "release", "board-mps2"])?,
+        firmware,
         plugin: built(&["release", "libqemu_pace.so"])?,
     })
 }
@@ -65,10 +63,24 @@ pub fn mps2_with(warnings: Warnings) -> Result<Mps2> {
 /// The model alone for a target: an ELF file, built where it is not up to date.
 pub fn twin(target: &str, warnings: Warnings) -> Result<PathBuf> {
     self::target(target)?;
-    let package = ["build", "--release", "-p", "board-mps2-twin", "--target"];
     let what = format!("the model alone for {target}");
-    build(&what, &[&package[..], &[target]].concat(), warnings)?;
-    built(&[target, "release", "board-mps2-twin"])
+    firmware("board-mps2-twin", &what, target, warnings)
+}
+
+/// A board's package for its target: an ELF file, built where it is not up to date.
+fn firmware(package: &str, what: &str, target: &str, warnings: Warnings) -> Result<PathBuf> {
+    const PROFILE: &str = "firmware";
+    let cargo = [
+        "build",
+        "--profile",
+        PROFILE,
+        "-p",
+        package,
+        "--target",
+        target,
+    ];
+    build(what, &cargo, warnings)?;
+    built(&[target, PROFILE, package])
 }
 
 /// The QEMU plugin that counts instructions, built where it is not up to date.
