@@ -147,7 +147,7 @@ pub trait Arithmetic: Ring {
     /// What a state is summed up in.
     type Sum: Accumulator<Self>;
 
-    /// max(0, x)
+    /// max(0, x); of what is not a number, anything.
     fn positive(self) -> Self;
     /// 1 + ε
     fn stretch(strain: Self) -> Self;
@@ -229,7 +229,10 @@ macro_rules! floating {
 
             #[inline(always)]
             fn positive(self) -> Self {
-                if self > 0.0 { self } else { 0.0 }
+                let bits = self.to_bits().cast_signed();
+                // all ones below zero
+                let negative = bits >> (8 * size_of::<Self>() - 1);
+                Self::from_bits((bits & !negative).cast_unsigned())
             }
             #[inline(always)]
             fn stretch(strain: Self) -> Self {

@@ -47,8 +47,9 @@ pub struct Eccentricity<R, const SPANS: usize> {
     present: bool,
     period: R,
     uw: Roll<R>,
-    /// The parent roll's own eccentricity, m.
+    /// The parent roll's own eccentricity, and what has been added to it, m.
     uw_own: R,
+    uw_more: R,
     rolls: [Roll<R>; SPANS],
     /// 1/R of the roll at the end of each span, 1/m; zero where it is round.
     per_radius: [R; SPANS],
@@ -95,6 +96,7 @@ impl<R: Real, const SPANS: usize> Eccentricity<R, SPANS> {
             period: R::of(h),
             uw: roll(0, parent),
             uw_own: R::of(parent),
+            uw_more: R::ZERO,
             rolls: core::array::from_fn(|i| roll(i + 1, idle(i).map_or(0.0, |r| r.eccentricity_m))),
             per_radius: core::array::from_fn(|i| {
                 idle(i).map_or(R::ZERO, |r| R::of(1.0 / r.radius_m))
@@ -109,6 +111,10 @@ impl<R: Real, const SPANS: usize> Eccentricity<R, SPANS> {
 
     /// A parent roll that is eccentric by `more`, m, beside the machine's own.
     pub fn add_to_parent_roll(&mut self, more: R) {
+        if more == self.uw_more {
+            return;
+        }
+        self.uw_more = more;
         self.present = self.own || more > R::ZERO;
         self.uw.eccentricity = self.uw_own + more;
     }

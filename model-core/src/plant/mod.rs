@@ -118,7 +118,9 @@ struct Scale<R: Scalar> {
     strain: R::Unit,
     force: R::Unit,
     torque: R::Unit,
+    torque_rolls: R::Unit,
     omega: R::Unit,
+    omega_rolls: R::Unit,
     r_uw: R::Unit,
     r_wu: R::Unit,
     travel: R::Unit,
@@ -349,7 +351,8 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     /// Moves everything by a step of integration, the friction of brakes and nips as it found it.
     fn advance(&mut self, actuators: &Actuators<R::Si>) {
         let radii = [self.state.r_uw, self.state.r_wu];
-        let offsets = self.turn_eccentric_rolls();
+        let eccentric = self.eccentricity.present();
+        let offsets = eccentric.then(|| self.turn_eccentric_rolls());
         if self.threaded && offsets.is_some() {
             self.look_at_web(offsets.as_ref());
         }
@@ -361,7 +364,11 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         } else {
             R::ONE
         };
-        let unwind = self.hold_unwind(actuators.torque.uw);
+        let unwind = if self.closed.uw {
+            self.hold_unwind(actuators.torque.uw)
+        } else {
+            Friction::NONE
+        };
         let torque = actuators.torque.uw - unwind.lambda;
         let load = Load {
             uw: R::of_si(torque, self.scale.torque),
@@ -373,8 +380,9 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         if self.holders.winds() || self.closed.rd || self.closed.fd {
             self.turn_held_windup(&actuators.torque, &load);
         } else {
-            let drive = self.holders.contact.drive(&actuators.torque);
-            self.turn_windup(&drive, &load);
+            let BySection { rd, fd, rr, .. } = actuators.torque;
+            let torque = [rd, fd, rr].map(|torque| R::of_si(torque, self.scale.torque_rolls));
+            self.turn_windup(self.motion.windup.pull(torque), &load);
         }
         if unwind.sticks {
             self.state.omega_uw = R::Sum::at(R::ZERO);
@@ -386,24 +394,21 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     }
 
     /// The deviations of eccentric rolls in the step that begins.
-    fn turn_eccentric_rolls(&mut self) -> Option<Offsets<R, SPANS>> {
-        if !self.eccentricity.present() {
-            return None;
-        }
+    #[inline(never)]
+    fn turn_eccentric_rolls(&mut self) -> Offsets<R, SPANS> {
         let x = self.state();
         let offsets = self.eccentricity.turn(&x);
-        Some(offsets.map(|v| R::of_si(v, self.scale.speed)))
+        offsets.map(|v| R::of_si(v, self.scale.speed))
     }
 
     /// Moves everything, the windup as one body.
-    fn turn_windup(&mut self, drive: &[R::Si; ROLLS], load: &Load<R, (), SPANS>) {
-        let [rd, fd, rr] = *drive;
-        let whole = Whole(R::of_si(rd + fd + rr, self.scale.force));
-        self.motion
-            .advance(&mut self.state, &self.web, &load.on(whole));
+    fn turn_windup(&mut self, force: R, load: &Load<R, (), SPANS>) {
+        let load = load.on(Whole(force));
+        self.motion.advance(&mut self.state, &self.web, &load);
     }
 
-    /// Moves everything, the windup with its brakes and nips.
+    /// Moves everything, the windup with its brakes and nips. Not inlined: the step without them is shorter so.
+    #[inline(never)]
     fn turn_held_windup(&mut self, torque: &BySection<R::Si>, load: &Load<R, (), SPANS>) {
         let x = self.state();
         let traction = self.load_nips(x.r_wu);
@@ -411,7 +416,8 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let mut holding = self.hold_windup(torque, &x, layer, traction.as_ref());
         let parts = &holding.parts;
         if parts.nips.iter().all(|nip| *nip == Nip::Sticks) {
-            self.turn_windup(&parts.drive, load);
+            let [rd, fd, rr] = parts.drive;
+            self.turn_windup(R::of_si(rd + fd + rr, self.scale.force), load);
             self.apart = [self.state.v[SPANS - 1]; ROLLS];
         } else {
             let parts = parts.map(|force| R::of_si(force, self.scale.force));
@@ -442,11 +448,9 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         })
     }
 
-    /// How the brake of the unwind holds over the step that begins.
+    /// How the closed brake of the unwind holds over the step that begins.
+    #[inline(never)]
     fn hold_unwind(&self, torque: R::Si) -> Friction<R::Si> {
-        if !self.closed.uw {
-            return Friction::NONE;
-        }
         let scale = &self.scale;
         let t_uw = self.web.tension[0].to_si(scale.force);
         let omega = self.state.omega_uw.value().to_si(scale.omega);
@@ -548,15 +552,17 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
 
     fn measure(&mut self, faults: &SensorFaults<R::Si>) -> Measurements<R::Si> {
         let (x, scale) = (&self.state, &self.scale);
-        let speed = |sum: &R::Sum| sum.value().to_si(scale.speed);
-        let v_rd = speed(&x.v[SPANS - 1]);
+        let v_rd = x.v[SPANS - 1].value();
+        let v = if self.holders.slips {
+            [v_rd, self.apart[0].value(), self.apart[1].value()]
+        } else {
+            [v_rd; ROLLS]
+        };
+        let omega = self.motion.windup.turn(v);
+        let [rd, fd, rr] = omega.map(|omega| omega.to_si(scale.omega_rolls));
+        let uw = x.omega_uw.value().to_si(scale.omega);
         let sight = Sight {
-            omega_uw: x.omega_uw.value().to_si(scale.omega),
-            v: if self.holders.slips {
-                [v_rd, speed(&self.apart[0]), speed(&self.apart[1])]
-            } else {
-                [v_rd; ROLLS]
-            },
+            omega: BySection { uw, rd, fd, rr },
             travel: x.travel.value().to_si(scale.travel),
             r_wu: x.r_wu.value().to_si(scale.r_wu),
         };
@@ -564,10 +570,9 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             .sensors
             .spans()
             .map(|span| self.web.tension[span].to_si(scale.force));
-        Measurements {
-            brakes: self.closed,
-            ..self.sensors.look(&sight, t, faults)
-        }
+        let mut measurements = self.sensors.look(&sight, t, faults);
+        measurements.brakes = self.closed;
+        measurements
     }
 }
 
@@ -641,7 +646,9 @@ impl<R: Scalar> Scale<R> {
             strain: R::unit(units.strain),
             force: R::unit(units.force),
             torque: R::unit(units.torque()),
+            torque_rolls: R::unit(units.torque_rolls()),
             omega: R::unit(units.omega()),
+            omega_rolls: R::unit(units.omega_rolls()),
             r_uw: R::unit(units.r_uw),
             r_wu: R::unit(units.r_wu),
             travel: R::unit(units.travel),

@@ -20,7 +20,8 @@ pub struct Motion<A: Arithmetic, const SPANS: usize> {
     /// The roll at the end of each span but the last, where the windup is.
     idle: [Option<Idle<A>>; SPANS],
     unwind: Unwind<A>,
-    windup: Windup<A>,
+    /// The windup.
+    pub windup: Windup<A>,
 }
 
 /// What drives the winder, constant over a step.
@@ -82,6 +83,37 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
     /// Moves everything by a step; `web` belongs to the state at its start.
     #[inline(always)]
     pub fn advance<W: windup::Load<A, APART>, const APART: usize>(
+        &self,
+        sums: &mut State<A::Sum, SPANS, APART>,
+        web: &Web<A, SPANS>,
+        load: &Load<A, W, SPANS>,
+    ) {
+        if load.threaded && load.offsets.is_none() {
+            let taut = Load {
+                threaded: true,
+                offsets: None,
+                ..*load
+            };
+            self.integrate(sums, web, &taut);
+        } else {
+            self.advance_otherwise(sums, web, load);
+        }
+    }
+
+    /// The same apart from the usual case, so that it does not stand in its way.
+    #[cold]
+    #[inline(never)]
+    fn advance_otherwise<W: windup::Load<A, APART>, const APART: usize>(
+        &self,
+        sums: &mut State<A::Sum, SPANS, APART>,
+        web: &Web<A, SPANS>,
+        load: &Load<A, W, SPANS>,
+    ) {
+        self.integrate(sums, web, load);
+    }
+
+    #[inline(always)]
+    fn integrate<W: windup::Load<A, APART>, const APART: usize>(
         &self,
         sums: &mut State<A::Sum, SPANS, APART>,
         web: &Web<A, SPANS>,

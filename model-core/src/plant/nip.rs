@@ -16,7 +16,8 @@ const GRAVITY: f64 = 9.806_65;
 pub struct Nips<R> {
     /// μ·W, m: nip force per width to tangential force.
     friction: R,
-    /// Share of it that worn drums have left.
+    /// Share of it that worn drums have lost, and have left.
+    lost: R,
     left: R,
     static_ratio: R,
     /// R_d + s/2 and R_d, of the rear and of the front drum, m.
@@ -59,6 +60,7 @@ impl<R: Real> Nips<R> {
         let weight = core::f64::consts::PI * machine.web.density_kg_m3() * GRAVITY;
         Self {
             friction: R::of(nips.friction * machine.web.width_m),
+            lost: R::ZERO,
             left: R::ONE,
             static_ratio: R::of(nips.static_ratio),
             half_distance: drums.map(|r| R::of(r + 0.5 * nips.drum_gap_m)),
@@ -100,8 +102,12 @@ impl<R: Real> Nips<R> {
         [drum(0), drum(1), rider]
     }
 
-    /// Drums that have lost a share of their friction; tells whether they have.
+    /// Drums that have lost a share of their friction; tells whether they lose it now.
     pub fn wear(&mut self, lost: R) -> bool {
+        if lost == self.lost {
+            return false;
+        }
+        self.lost = lost;
         self.left = R::ONE - lost.clamp(R::ZERO, R::ONE);
         lost > R::ZERO
     }

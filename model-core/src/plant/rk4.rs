@@ -86,7 +86,7 @@ pub trait System<A: Arithmetic, const SPANS: usize, const APART: usize> {
     fn rates(&self, x: &State<A, SPANS, APART>) -> State<A::Rate, SPANS, APART>;
 }
 
-/// Advances the sums by x(t + h) = x + h/6·(k1 + 2·k2 + 2·k3 + k4), with `k1` the rates at the start; rates come for a
+/// Advances the sums by x(t + h) = x + h/6·(k1 + 2·(k2 + k3) + k4), with `k1` the rates at the start; rates come for a
 /// sixth of the step.
 #[inline(always)]
 pub fn advance<A: Arithmetic, const SPANS: usize, const APART: usize>(
@@ -96,10 +96,11 @@ pub fn advance<A: Arithmetic, const SPANS: usize, const APART: usize>(
 ) {
     let k2 = system.rates(&sums.zip(&k1, |sum, k| sum.after_half(k)));
     let k3 = system.rates(&sums.zip(&k2, |sum, k| sum.after_half(k)));
-    let k4 = system.rates(&sums.zip(&k3, |sum, k| sum.after_whole(k)));
-    let outer = k1.zip(&k4, |a, b| a + b);
+    // what is added up by now need not be kept through the last rates
     let inner = k2.zip(&k3, |a, b| a + b);
-    let change = outer.zip(&inner, |outer, inner| outer + (inner + inner));
+    let most = k1.zip(&inner, |a, b| a + (b + b));
+    let k4 = system.rates(&sums.zip(&k3, |sum, k| sum.after_whole(k)));
+    let change = most.zip(&k4, |a, b| a + b);
     *sums = sums.zip(&change, |mut sum, change| {
         sum.advance(change);
         sum

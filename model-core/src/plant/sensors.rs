@@ -3,7 +3,7 @@
 //! Not here: noise. Sensors fail only where a test makes them.
 
 use crate::exchange::{BySection, Measurements, SensorFaults};
-use crate::machine::{DrivenRoll, Machine};
+use crate::machine::Machine;
 use crate::real::Real;
 
 /// Coefficients of the sensors.
@@ -11,14 +11,11 @@ use crate::real::Real;
 struct Coefficients<R> {
     /// 1 − exp(−h/τ) of the load cells' filter.
     filter: R,
-    /// 1/R of the rear drum, the front drum and the rider roll, 1/m.
-    per_radius: BySection<R>,
     /// Encoder pulses for a metre of surface, 1/m.
     pulses: R,
-    /// The roll on the load cells, and the shares of the tension before and after it.
+    /// The roll on the load cells, and whether they feel the span before it, too.
     load_cell_roll: usize,
-    before: R,
-    after: R,
+    both_spans: bool,
     /// The load cells' wrap angle, and the one they are calibrated for, rad.
     wrap: f64,
     calibrated_wrap: f64,
@@ -33,7 +30,7 @@ struct Coefficients<R> {
 pub struct Sensors<R> {
     coefficients: Coefficients<R>,
     tension: R,
-    /// Error of the wrap angle, rad, and sin(β/2)/sin(β_cal/2) with it.
+    /// Error of the wrap angle, rad, and sin(β/2)/(2·sin(β_cal/2)) with it.
     wrap_error: R,
     gain: R,
     /// How far the zero has wandered off, N.
@@ -43,17 +40,15 @@ pub struct Sensors<R> {
     fraction: R,
 }
 
-/// sin(β/2)/sin(β_cal/2): what the load cells show of a tension.
+/// sin(β/2)/(2·sin(β_cal/2)): what the load cells show of the sum of both tensions.
 fn gain(wrap: f64, calibrated: f64) -> f64 {
-    libm::sin(0.5 * wrap) / libm::sin(0.5 * calibrated)
+    0.5 * libm::sin(0.5 * wrap) / libm::sin(0.5 * calibrated)
 }
 
 /// What the sensors look at.
 pub struct Sight<R> {
-    /// Angular velocity of the parent roll, rad/s.
-    pub omega_uw: R,
-    /// Surface speeds of rear drum, front drum and rider roll, m/s.
-    pub v: [R; 3],
+    /// Angular velocities of the parent roll, the drums and the rider roll, rad/s.
+    pub omega: BySection<R>,
     /// Way of the rear drum's surface since the last look, m.
     pub travel: R,
     /// Radius of the shipping roll, m.
@@ -63,24 +58,15 @@ pub struct Sight<R> {
 impl<R: Real> Sensors<R> {
     /// The sensors of a machine, looked at every `h` seconds.
     pub fn new(machine: &Machine, h: f64) -> Self {
-        let per_radius = |roll: &DrivenRoll| R::of(1.0 / roll.radius_m);
         let cells = &machine.load_cells;
         let calibrated = cells.calibrated_wrap_rad;
-        let before = if cells.both_spans { 0.5 } else { 0.0 };
         let circumference = core::f64::consts::TAU * machine.rear_drum.radius_m;
         Self {
             coefficients: Coefficients {
                 filter: R::of(-libm::expm1(-h / machine.load_cells.filter_s)),
-                per_radius: BySection {
-                    uw: R::ZERO,
-                    rd: per_radius(&machine.rear_drum),
-                    fd: per_radius(&machine.front_drum),
-                    rr: per_radius(&machine.rider_roll),
-                },
                 pulses: R::of(machine.encoder_pulses / circumference),
                 load_cell_roll: cells.roll,
-                before: R::of(before),
-                after: R::of(1.0 - before),
+                both_spans: cells.both_spans,
                 wrap: cells.wrap_rad,
                 calibrated_wrap: calibrated,
                 h: R::of(h),
@@ -113,14 +99,11 @@ impl<R: Real> Sensors<R> {
         faults: &SensorFaults<R>,
     ) -> Measurements<R> {
         self.weigh(tensions, faults);
-        let [rd, fd, rr] = sight.v;
-        let c = &self.coefficients;
         let heard = |silent: bool, omega: R| if silent { R::ZERO } else { omega };
         let omega = BySection {
-            uw: heard(faults.encoder_uw, sight.omega_uw),
-            rd: heard(faults.encoder_rd, rd * c.per_radius.rd),
-            fd: fd * c.per_radius.fd,
-            rr: rr * c.per_radius.rr,
+            uw: heard(faults.encoder_uw, sight.omega.uw),
+            rd: heard(faults.encoder_rd, sight.omega.rd),
+            ..sight.omega
         };
         if !faults.encoder_rd {
             self.count_pulses(sight.travel);
@@ -141,16 +124,18 @@ impl<R: Real> Sensors<R> {
             let wrap = c.wrap + faults.wrap_error.to_f64();
             self.gain = R::of(gain(wrap, c.calibrated_wrap));
         }
-        self.wandered = if faults.drift == R::ZERO {
-            R::ZERO
+        let mut zero = c.zero;
+        if faults.drift == R::ZERO {
+            self.wandered = R::ZERO;
         } else {
-            self.wandered + faults.drift * c.h
-        };
+            self.wandered += faults.drift * c.h;
+            zero += self.wandered;
+        }
         if faults.load_cell_stuck {
             return;
         }
-        let felt = c.before * before + c.after * after;
-        let shown = self.gain * felt + c.zero + self.wandered;
+        let sum = after + if c.both_spans { before } else { after };
+        let shown = self.gain * sum + zero;
         self.tension += c.filter * (shown - self.tension);
     }
 

@@ -29,6 +29,8 @@ pub struct Units {
     pub inertia: f64,
     /// Of the shipping roll's radius, m.
     pub r_wu: f64,
+    /// Of the radii of drums and rider roll, m.
+    pub r_rolls: f64,
     /// Of the windup's masses at the surface, kg.
     pub mass: f64,
     /// Of the way in a step, m.
@@ -64,6 +66,7 @@ impl Units {
         r_uw: 1.0,
         inertia: 1.0,
         r_wu: 1.0,
+        r_rolls: 1.0,
         mass: 1.0,
         travel: 1.0,
     };
@@ -76,6 +79,7 @@ impl Units {
         let speed = SPEED_RESERVE * machine.operation.max_speed_m_s;
         let parent = |r: f64| machine.parent_roll_offset() + machine.web.roll_inertia(r);
         let (roll, shipping) = (&machine.parent_roll, &machine.shipping_roll);
+        let rolls = [&machine.rear_drum, &machine.front_drum, &machine.rider_roll];
         Self {
             speed,
             strain: STRAIN,
@@ -83,6 +87,9 @@ impl Units {
             r_uw: roll.full_radius_m,
             inertia: parent(roll.full_radius_m).max(parent(roll.spool_radius_m)),
             r_wu: shipping.full_radius_m,
+            r_rolls: rolls
+                .iter()
+                .fold(f64::INFINITY, |r, roll| r.min(roll.radius_m)),
             mass: machine.windup_mass_kg(shipping.full_radius_m),
             travel: speed * h,
         }
@@ -96,6 +103,16 @@ impl Units {
     /// Of torques on the parent roll, N·m.
     pub fn torque(&self) -> f64 {
         self.force * self.r_uw
+    }
+
+    /// Of angular velocities of drums and rider roll, rad/s.
+    pub fn omega_rolls(&self) -> f64 {
+        self.speed / self.r_rolls
+    }
+
+    /// Of torques on drums and rider roll, N·m.
+    pub fn torque_rolls(&self) -> f64 {
+        self.force * self.r_rolls
     }
 
     /// Refuses a machine with coefficients that `R` cannot hold in these units: spans too short, or a web too

@@ -32,6 +32,8 @@ fn each<T>(of: impl Fn(usize) -> T) -> [T; ROLLS] {
 /// Coefficients of the windup.
 #[derive(Clone, Copy, Debug)]
 pub struct Windup<A: Arithmetic> {
+    /// 1/R of each roll, 1/m.
+    per_radius: [A; ROLLS],
     /// J/R² of each roll, kg, and of all together.
     mass: [A; ROLLS],
     drum_mass: A,
@@ -134,6 +136,7 @@ impl<A: Arithmetic> Windup<A> {
         let growth = |m: &Machine| m.web.inertia_factor() * layer(m);
         let core = |m: &Machine| m.shipping_roll.core_radius_m;
         Self {
+            per_radius: each(|j| machines.coefficient(|m, u| u.r_rolls / roll(m, j).radius_m)),
             mass: each(|j| machines.coefficient(|m, u| roll(m, j).mass_kg() / u.mass)),
             drum_mass: machines.coefficient(|m, u| m.windup_mass_kg(core(m)) / u.mass),
             least_mass: machines.coefficient(|_, u| LEAST_MASS / u.mass),
@@ -171,6 +174,19 @@ impl<A: Arithmetic> Windup<A> {
             growth: self.growth * paper * hollow,
             radius_rate: (paper * core).rate(self.layer),
         }
+    }
+
+    /// Σ T_j/R_j, the force of all motors at the surface.
+    #[inline(always)]
+    pub fn pull(&self, torque: [A; ROLLS]) -> A {
+        let [rd, fd, rr] = self.per_radius;
+        torque[0] * rd + torque[1] * fd + torque[2] * rr
+    }
+
+    /// ω_j = V_j/R_j of drums and rider roll.
+    #[inline(always)]
+    pub fn turn(&self, v: [A; ROLLS]) -> [A; ROLLS] {
+        each(|j| v[j] * self.per_radius[j])
     }
 
     /// {15} M = J_rd/R_rd² + J_fd/R_fd² + J_rr/R_rr² + J_wu/R_wu², kg: of the windup as one body.
