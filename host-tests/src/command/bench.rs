@@ -11,7 +11,7 @@ use model_core::drive::DRIVE_PERIOD_MS;
 use model_core::fixed::Word;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::machine::{MAX_SPANS, Machine};
-use model_core::plant::{PLANT_PERIOD_MS, Winder};
+use model_core::plant::{PLANT_PERIOD_MS, Winder, modes};
 use model_core::real;
 use model_core::simulator::Simulator;
 use model_core::twin::{self, Course, Extent};
@@ -178,6 +178,10 @@ impl Bench {
         }
         let titles = CORES.map(|core| format!("{} ({})", core.name, core.board));
         println!("## {name}, {}\n", scalar.name);
+        let substeps = modes::substeps(machine, PERIOD_S);
+        if substeps > 1 {
+            println!("A plant step is {substeps} steps of the motion.\n");
+        }
         println!("| Part | Needed | {} |", titles.join(" | "));
         println!("|---|---:|{}", "---:|".repeat(CORES.len()));
         for (section, part) in PARTS {
@@ -192,6 +196,9 @@ impl Bench {
         Ok(())
     }
 }
+
+/// Period of the plant task, s.
+const PERIOD_S: f64 = 1e-3 * PLANT_PERIOD_MS as f64;
 
 /// A cell without a measurement.
 const NOTHING: &str = "–";
@@ -251,16 +258,15 @@ fn speeds<R: real::Scalar>(machine: &Machine) -> Result<[f64; 2]> {
 }
 
 fn speeds_with<R: real::Scalar, const SPANS: usize>(machine: &Machine) -> Result<[f64; 2]> {
-    let period = 1e-3 * f64::from(PLANT_PERIOD_MS);
     let course = Course::of(machine, Extent::Short);
     let plant = best(|| {
-        let mut winder = Winder::<R, SPANS>::new(machine, period)?;
+        let mut winder = Winder::<R, SPANS>::new(machine, PERIOD_S)?;
         let mut steps = 0;
         for (_, actuators) in course.steps::<R::Si>() {
             black_box(winder.step(black_box(&actuators)));
             steps += 1;
         }
-        Ok(f64::from(steps) * period)
+        Ok(f64::from(steps) * PERIOD_S)
     })?;
     let cycle_s = 1e-3 * f64::from(DRIVE_PERIOD_MS);
     let commands: Vec<Commands> = (0..twin::CYCLES)
