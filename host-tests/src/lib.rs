@@ -4,6 +4,7 @@
 //! This library starts simulators, commands them as a winder PLC would, and shows what came of it. Its one
 //! program is the command line tool `winder`: a module of [`command`] for each subcommand.
 
+pub mod batch;
 pub mod command;
 pub mod figures;
 pub mod flops;

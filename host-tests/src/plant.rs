@@ -17,22 +17,26 @@
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::fixed::Word;
-use model_core::machine::{MAX_SPANS, Machine, PRESETS};
+use model_core::machine::{Machine, MachineError, PRESETS};
 use model_core::plant::windup::ROLLS;
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
 use model_core::real::{self, Real};
 
+use crate::batch;
 use crate::machine_file::Description;
 
 /// Spans of a machine whose idle rolls are lumped: guide rolls `gr`, spreader rolls `sr`.
 const LUMPED: usize = 3;
 /// Step of the plant, ns.
 const STEP_NS: u64 = 1_000_000 * PLANT_PERIOD_MS as u64;
+/// Step of the plant, s.
+pub(crate) const H: f64 = 1e-3 * PLANT_PERIOD_MS as f64;
 /// Longest schedule, s: eleven days.
 const LONGEST_S: f64 = 1e6;
 /// Largest torque, N·m: the largest motor that a machine's description may have.
@@ -50,23 +54,37 @@ pub struct Options {
     /// brake_uw,brake_rd,brake_fd (0 or 1). Each row holds until the next; the last one ends the run
     #[arg(long, value_name = "FILE.csv")]
     pub schedule: PathBuf,
-    /// Speeds, tensions and radii over time, as CSV in SI units; `-` prints them
+    /// Speeds, tensions and radii over time, as CSV in SI units; with --sweep a row for each run; `-` prints them
     #[arg(long, value_name = "FILE.csv")]
     pub out: PathBuf,
-    /// Machine: a preset or a machine file, see `cargo winder machine`
-    #[arg(long, value_name = "NAME|FILE", default_value = PRESETS[0].0)]
-    pub machine: String,
-    /// Numbers to compute with; the microcontroller has f32
-    #[arg(long, value_enum, default_value_t = Scalar::F64)]
-    pub scalar: Scalar,
+    /// Machine: a preset or a machine file, see `cargo winder machine` [default: NEWS-8000, or the sweep's]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub machine: Option<String>,
+    /// Numbers to compute with; the microcontroller has f32 [default: f64; with --sweep f32, which is quickest]
+    #[arg(long, value_enum)]
+    pub scalar: Option<Scalar>,
     /// Time from row to row of the output, a multiple of 0.004 s
     #[arg(
         long = "every",
         value_name = "SECONDS",
         default_value_t = 1.0,
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        conflicts_with = "sweep"
     )]
     pub every_s: f64,
+    /// Runs many winders at once, one for each combination of the values that this file gives to parameters of the
+    /// machine. It reads, for example:
+    ///
+    ///     machine = "NEWS-8000"
+    ///     [vary]
+    ///     web.stiffness_n_m = [220e3, 260e3, 300e3]
+    ///     parent_roll.full_radius_m = { from = 1.0, to = 1.5, steps = 6 }
+    ///
+    /// The output has a row for each run: the parameters' values; the largest tension in any span of the whole web, N,
+    /// with its time, and the smallest; the final speeds, tensions and radii; the times at which the web broke, a
+    /// roll of the windup first lost traction and the shipping roll burst, empty where that did not happen
+    #[arg(long, value_name = "FILE.toml", verbatim_doc_comment)]
+    pub sweep: Option<PathBuf>,
 }
 
 /// Numbers to compute with.
@@ -85,10 +103,14 @@ pub enum Scalar {
 /// `console` gets a line about what was done, or the result itself when the output file is `-`. Nothing is
 /// written before machine, schedule and options have been found good.
 pub fn run(options: &Options, console: &mut dyn Write) -> Result<()> {
-    let machine = Description::find(&options.machine)?.machine;
+    if let Some(file) = &options.sweep {
+        return batch::run(options, file, console);
+    }
+    let machine = options.machine.as_deref().unwrap_or(PRESETS[0].0);
+    let machine = Description::find(machine)?.machine;
     let every = output_period(options.every_s)?;
     let schedule = Schedule::open(&options.schedule)?;
-    let simulate = match options.scalar {
+    let simulate = match options.scalar.unwrap_or(Scalar::F64) {
         Scalar::F32 => simulate::<f32>,
         Scalar::F64 => simulate::<f64>,
         Scalar::Fixed => simulate::<Word>,
@@ -178,10 +200,10 @@ pub struct Schedule {
 
 /// What holds from a step on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Row {
+pub(crate) struct Row {
     tick: u64,
-    torque: BySection<f64>,
-    brakes: Brakes<bool>,
+    pub torque: BySection<f64>,
+    pub brakes: Brakes<bool>,
 }
 
 impl Schedule {
@@ -221,16 +243,19 @@ impl Schedule {
     }
 
     /// The step at which the run ends.
-    fn end(&self) -> u64 {
+    pub(crate) fn end(&self) -> u64 {
         self.rows.last().map_or(0, |row| row.tick)
+    }
+
+    /// The rows, each with the steps in which it holds, counted from 0.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (&Row, Range<u64>)> {
+        let pairs = self.rows.windows(2);
+        pairs.map(|pair| (&pair[0], pair[0].tick..pair[1].tick))
     }
 
     /// What holds at each step, from the first.
     fn steps(&self) -> impl Iterator<Item = &Row> {
-        self.rows.windows(2).flat_map(|pair| {
-            let steps = pair[1].tick - pair[0].tick;
-            (0..steps).map(|_| &pair[0])
-        })
+        self.rows().flat_map(|(row, steps)| steps.map(move |_| row))
     }
 }
 
@@ -336,23 +361,36 @@ fn switch(column: &str, field: &str) -> Result<bool> {
     }
 }
 
+/// An expression for the number of spans of a machine, which it has as a constant.
+macro_rules! with_spans {
+    ($spans:expr, |$SPANS:ident| $body:expr) => {
+        with_spans!(@arms $spans, $SPANS, $body, 2 3 4 5 6 7)
+    };
+    (@arms $spans:expr, $SPANS:ident, $body:expr, $($few:literal)*) => {
+        match $spans {
+            $($few => {
+                const $SPANS: usize = $few;
+                $body
+            })*
+            _ => {
+                const $SPANS: usize = model_core::machine::MAX_SPANS;
+                $body
+            }
+        }
+    };
+}
+pub(crate) use with_spans;
+
 /// [`simulate_spans`] with the machine's number of spans.
-fn simulate<R: model_core::real::Scalar>(
+fn simulate<R: real::Scalar>(
     machine: &Machine,
     schedule: &Schedule,
     every: u64,
     out: &mut dyn Write,
 ) -> Result<Run> {
-    let simulate = match machine.idle.len() + 1 {
-        2 => simulate_spans::<R, 2>,
-        3 => simulate_spans::<R, 3>,
-        4 => simulate_spans::<R, 4>,
-        5 => simulate_spans::<R, 5>,
-        6 => simulate_spans::<R, 6>,
-        7 => simulate_spans::<R, 7>,
-        _ => simulate_spans::<R, MAX_SPANS>,
-    };
-    simulate(machine, schedule, every, out)
+    with_spans!(machine.idle.len() + 1, |SPANS| {
+        simulate_spans::<R, SPANS>(machine, schedule, every, out)
+    })
 }
 
 /// Runs the plant and writes a row at the start and every `every` steps.
@@ -362,9 +400,8 @@ fn simulate_spans<R: real::Scalar, const SPANS: usize>(
     every: u64,
     out: &mut dyn Write,
 ) -> Result<Run> {
-    let mut winder = Winder::<R, SPANS>::new(machine, 1e-3 * f64::from(PLANT_PERIOD_MS))?;
-    winder.thread_at(R::Si::of(stall_tension(machine)));
-    writeln!(out, "{}", header(SPANS))?;
+    let mut winder = at_start::<R, SPANS>(machine)?;
+    writeln!(out, "t_s,{}", columns(SPANS))?;
     write_row(out, 0, &winder)?;
     let mut run = Run {
         rows: schedule.end() / every + 1,
@@ -398,40 +435,53 @@ fn simulate_spans<R: real::Scalar, const SPANS: usize>(
     Ok(run)
 }
 
-/// The columns of the output: speeds of the rolls, tensions of the spans behind them, radii.
-fn header(spans: usize) -> String {
+/// The columns of a state: speeds of the rolls, tensions of the spans behind them, radii.
+pub(crate) fn columns(spans: usize) -> String {
     let idle: Vec<_> = match spans {
         LUMPED => vec!["gr".into(), "sr".into()],
         spans => (1..spans).map(|roll| roll.to_string()).collect(),
     };
     let columns = |prefix| idle.iter().map(move |roll| format!("{prefix}_{roll},"));
     let (v, t): (String, String) = (columns("v").collect(), columns("t").collect());
-    format!("t_s,v_uw,{v}v_rd,t_uw,{t}r_uw,r_wu")
+    format!("v_uw,{v}v_rd,t_uw,{t}r_uw,r_wu")
+}
+
+/// The winder as every run begins with it: threaded at stall tension.
+pub(crate) fn at_start<R: real::Scalar, const SPANS: usize>(
+    machine: &Machine,
+) -> Result<Winder<R, SPANS>, MachineError> {
+    let mut winder = Winder::new(machine, H)?;
+    winder.thread_at(R::Si::of(stall_tension(machine)));
+    Ok(winder)
 }
 
 /// Tension at standstill, N.
-fn stall_tension(machine: &Machine) -> f64 {
+pub(crate) fn stall_tension(machine: &Machine) -> f64 {
     machine.operation.stall_share * machine.operation.tension_n_m * machine.web.width_m
 }
 
 /// The time of a step, s.
-fn seconds(step: u64) -> f64 {
+pub(crate) fn seconds(step: u64) -> f64 {
     (step * u64::from(PLANT_PERIOD_MS)) as f64 / 1e3
 }
 
-/// One row of the output. `Debug` gives the shortest digits that read back as the same number.
+/// One row of the output.
 fn write_row<R: real::Scalar, const SPANS: usize>(
     out: &mut dyn Write,
     step: u64,
     winder: &Winder<R, SPANS>,
 ) -> io::Result<()> {
+    writeln!(out, "{:?},{}", seconds(step), fields_of(winder))
+}
+
+/// A state, in the order of [`columns`]. `Debug` gives the shortest digits that read back as the same number.
+pub(crate) fn fields_of<R: real::Scalar, const SPANS: usize>(winder: &Winder<R, SPANS>) -> String {
     let (x, t) = (winder.state(), winder.tension());
-    let v_uw = x.omega_uw * x.r_uw;
-    write!(out, "{:?},{v_uw:?}", seconds(step))?;
+    let mut fields = format!("{:?}", x.omega_uw * x.r_uw);
     for value in x.v.into_iter().chain(t).chain([x.r_uw, x.r_wu]) {
-        write!(out, ",{value:?}")?;
+        fields += &format!(",{value:?}");
     }
-    writeln!(out)
+    fields
 }
 
 #[cfg(test)]

@@ -114,25 +114,40 @@ impl<R: Real> Sum<R> for Plain<R> {
 /// Source: W. Kahan, "Further remarks on reducing truncation errors", CACM 8 (1965) 40.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Compensated<R> {
-    value: R,
-    carry: R,
+    /// The sum, rounded.
+    pub value: R,
+    /// What rounding has taken away and the next increment takes along.
+    pub carry: R,
 }
 
-impl<R: Real> Sum<R> for Compensated<R> {
-    fn at(value: R) -> Self {
+impl<R: Ring> Compensated<R> {
+    /// A sum that stands at `value`.
+    pub fn at(value: R) -> Self {
         Self {
             value,
             carry: R::ZERO,
         }
     }
-    fn value(&self) -> R {
-        self.value
-    }
-    fn add(&mut self, increment: R) {
+    /// Adds an increment.
+    #[inline(always)]
+    pub fn add(&mut self, increment: R) {
         let increment = increment + self.carry;
         let sum = self.value + increment;
         self.carry = increment - (sum - self.value);
         self.value = sum;
+    }
+}
+
+impl<R: Real> Sum<R> for Compensated<R> {
+    fn at(value: R) -> Self {
+        Self::at(value)
+    }
+    fn value(&self) -> R {
+        self.value
+    }
+    #[inline(always)]
+    fn add(&mut self, increment: R) {
+        self.add(increment);
     }
 }
 

@@ -20,9 +20,10 @@ fn options(schedule: &str) -> (TempDir, Options) {
     let options = Options {
         schedule: path.join("schedule.csv"),
         out: path.join("out.csv"),
-        machine: "NEWS-8000".into(),
-        scalar: Scalar::F64,
+        machine: None,
+        scalar: None,
         every_s: 1.0,
+        sweep: None,
     };
     fs::write(&options.schedule, schedule).unwrap();
     (folder, options)
@@ -69,7 +70,7 @@ fn numbers_round_trip() {
     );
     for scalar in [Scalar::F32, Scalar::F64, Scalar::Fixed] {
         let (_folder, mut options) = options(&schedule);
-        (options.scalar, options.every_s) = (scalar, 0.1);
+        (options.scalar, options.every_s) = (Some(scalar), 0.1);
         let table = run(&options);
         assert_eq!(table.len(), 21);
         let expected = match scalar {
@@ -147,7 +148,12 @@ fn what_is_refused_leaves_no_file() {
             |o| o.schedule.set_file_name("none"),
             "none: ",
         ),
-        ("machine", &good, |o| o.machine = "x".into(), "NEWS-8000"),
+        (
+            "machine",
+            &good,
+            |o| o.machine = Some("x".into()),
+            "NEWS-8000",
+        ),
         ("period", &good, |o| o.every_s = H / 2.0, "--every 0.002 "),
     ];
     for (name, schedule, change, reason) in cases {

@@ -186,4 +186,9 @@ impl Delay {
         self.history = self.history << 1 | u128::from(on);
         self.history >> self.steps & 1 == 1
     }
+
+    /// The signal has been off for `delay_s`: as long as it stays off, nothing comes out.
+    pub fn rests(&self) -> bool {
+        self.history & ((1 << self.steps) - 1) == 0
+    }
 }

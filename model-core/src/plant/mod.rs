@@ -9,6 +9,7 @@
 pub mod contact;
 pub mod eccentricity;
 pub mod friction;
+pub mod glide;
 pub mod modes;
 pub mod motion;
 pub mod nip;
@@ -21,7 +22,7 @@ pub mod windup;
 
 use crate::exchange::{Actuators, Brakes, BySection, MachineFaults, Measurements, SensorFaults};
 use crate::machine::{Machine, MachineError};
-use crate::real::{Accumulator, Real, Ring, Scalar};
+use crate::real::{Accumulator, Arithmetic, Real, Ring, Scalar};
 use contact::{Contact, Holding, ParentRoll, Traction};
 use eccentricity::{Eccentricity, Offsets};
 use friction::{Brake, Delay, Friction, Law};
@@ -30,7 +31,7 @@ use nip::Nips;
 use rk4::State;
 use sensors::{Sensors, Sight};
 use span::Web;
-use units::{One, Units};
+use units::{Machines, One, Units};
 use windup::{FRONT, Nip, Parts, ROLLS, Speeds, Whole};
 
 /// Period of the plant task and longest step of its integration, ms.
@@ -100,15 +101,16 @@ struct Holders<R> {
 
 /// Where the web begins and ends.
 #[derive(Clone, Copy, Debug)]
-struct Limits<R> {
+pub struct Limits<A> {
     /// Tension at which the web breaks.
-    strength: R,
-    core_radius: R,
-    /// A shipping roll as thin as this has lost its web: the machine has run backwards.
-    bare_radius: R,
-    full_radius: R,
-    expire_radius: R,
-    threaded_strain: R,
+    pub strength: A,
+    core_radius: A,
+    /// A shipping roll thinner than this has lost its web: the machine has run backwards.
+    pub bare_radius: A,
+    full_radius: A,
+    /// A parent roll as thin as this has run out of paper.
+    pub expire_radius: A,
+    threaded_strain: A,
 }
 
 /// The units in which the state is counted.
@@ -148,7 +150,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let step = h / f64::from(substeps);
         let units = Units::of::<R>(machine, h);
         units.fit::<R>(machine, step)?;
-        let limits = Limits::new(machine, &units);
+        let limits = Limits::new(&One(machine, &units));
         let zero = R::Sum::at(R::ZERO);
         Ok(Self {
             motion: Motion::new(&One(machine, &units), step),
@@ -625,16 +627,17 @@ impl<R: Real> Holders<R> {
     }
 }
 
-impl<R: Scalar> Limits<R> {
-    fn new(machine: &Machine, units: &Units) -> Self {
-        let (roll, core) = (&machine.parent_roll, machine.shipping_roll.core_radius_m);
+impl<A: Arithmetic> Limits<A> {
+    /// From the machines' description.
+    pub fn new(machines: &impl Machines<A>) -> Self {
+        let core = |m: &Machine| m.shipping_roll.core_radius_m;
         Self {
-            strength: R::coefficient(machine.web.strength_n_m * machine.web.width_m / units.force),
-            core_radius: R::coefficient(core / units.r_wu),
-            bare_radius: R::coefficient(BARE * core / units.r_wu),
-            full_radius: R::coefficient(roll.full_radius_m / units.r_uw),
-            expire_radius: R::coefficient(roll.expire_radius_m / units.r_uw),
-            threaded_strain: R::coefficient(THREADED_STRAIN / units.strain),
+            strength: machines.coefficient(|m, u| m.web.strength_n_m * m.web.width_m / u.force),
+            core_radius: machines.coefficient(|m, u| core(m) / u.r_wu),
+            bare_radius: machines.coefficient(|m, u| BARE * core(m) / u.r_wu),
+            full_radius: machines.coefficient(|m, u| m.parent_roll.full_radius_m / u.r_uw),
+            expire_radius: machines.coefficient(|m, u| m.parent_roll.expire_radius_m / u.r_uw),
+            threaded_strain: machines.coefficient(|_, u| THREADED_STRAIN / u.strain),
         }
     }
 }

@@ -1,0 +1,59 @@
+//! A winder that glides: nothing but its motion moves it.
+//!
+//! Not here: the motion of several winders side by side, which whoever has the processor for it arranges.
+//!
+//! Most winders glide most of the time: brakes open, rolls round and sticking to each other, layers of one thickness.
+//! A step is then the same for all of them:
+//!
+//! - [`Motion::advance`](super::motion::Motion::advance) under [`Winder::load`], [`Winder::substeps`] times, the way
+//!   counted from zero;
+//! - each time the web of the new state, and whether its [`Limits`](super::Limits) still hold.
+//!
+//! So that several winders can be moved at once, each gives away its [`Winder::sums`], and takes them back with
+//! [`Winder::resume`] where one of them comes to a limit. That step it does by itself, from the sums before it.
+
+use super::motion::Load;
+use super::rk4::State;
+use super::windup::Whole;
+use super::{Delay, Winder};
+use crate::exchange::{Brakes, BySection};
+use crate::real::Scalar;
+
+impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
+    /// Nothing but its motion moves the winder in a step with these brakes commanded, if nobody handles it.
+    pub fn glides(&self, brakes: &Brakes<bool>) -> bool {
+        let open = |delay: &Delay, on: bool| !on && delay.rests();
+        let apart = self.holders.winds() || self.eccentricity.present();
+        !apart
+            && open(&self.delay.uw, brakes.uw)
+            && open(&self.delay.rd, brakes.rd)
+            && open(&self.delay.fd, brakes.fd)
+    }
+
+    /// What drives it under these torques while it glides.
+    pub fn load(&self, torque: &BySection<R::Si>) -> Load<R, Whole<R>, SPANS> {
+        let layer = if self.threaded { R::ONE } else { R::ZERO };
+        Load {
+            uw: R::of_si(torque.uw, self.scale.torque),
+            windup: self.whole(&self.holders.contact.drive(torque)),
+            layer,
+            threaded: self.threaded,
+            offsets: None,
+        }
+    }
+
+    /// The state variables as they are summed up.
+    pub fn sums(&self) -> &State<R::Sum, SPANS, 0> {
+        &self.state
+    }
+
+    /// Goes on from where the winder has glided to, its web as whole or broken as before. Its sensors have not seen
+    /// the way there.
+    pub fn resume(&mut self, sums: &State<R::Sum, SPANS, 0>) {
+        self.state = *sums;
+        self.closed = Brakes::default();
+        if self.threaded {
+            self.look_at_web(&None);
+        }
+    }
+}
