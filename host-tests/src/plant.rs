@@ -72,8 +72,10 @@ pub struct Options {
         conflicts_with = "sweep"
     )]
     pub every_s: f64,
-    /// Runs many winders at once, one for each combination of the values that this file gives to parameters of the
-    /// machine. It reads, for example:
+    /// Runs many winders at once: one for each combination of the values that this file gives to parameters of the
+    /// machine
+    ///
+    /// The file reads, for example:
     ///
     ///     machine = "NEWS-8000"
     ///     [vary]
@@ -82,7 +84,8 @@ pub struct Options {
     ///
     /// The output has a row for each run: the parameters' values; the largest tension in any span of the whole web, N,
     /// with its time, and the smallest; the final speeds, tensions and radii; the times at which the web broke, a
-    /// roll of the windup first lost traction and the shipping roll burst, empty where that did not happen
+    /// roll of the windup first lost traction and the shipping roll burst, empty where that did not happen (slip and
+    /// burst: if nips.slip or wound_on_tension.compresses is on)
     #[arg(long, value_name = "FILE.toml", verbatim_doc_comment)]
     pub sweep: Option<PathBuf>,
 }

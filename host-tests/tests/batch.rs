@@ -2,11 +2,15 @@
 
 // bits are meant exactly
 #![allow(clippy::float_cmp)]
+// a test that cannot go on fails
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
 
 use host_tests::batch::group::{Extremes, Progress, Run, side_by_side};
 use host_tests::batch::lanes::{LANES, Lanes};
 use host_tests::batch::rates;
-use host_tests::plant::Schedule;
+use host_tests::plant::{self, Options, Scalar, Schedule};
 use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::machine::{Machine, PRESETS};
 use model_core::plant::Winder;
@@ -311,6 +315,84 @@ fn a_lane_computes_as_a_number_does_at_the_ends() {
         others.rotate_left(shift);
         lanes_compute_as_numbers(&ends, &others);
     }
+}
+
+/// The rows of a sweep, in the order of its combinations, end as single runs of the same machines do.
+#[test]
+fn a_row_of_a_sweep_is_the_end_of_a_single_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let torques = "t_s,T_uw,T_rd,T_fd,T_rr,brake_uw\n0,-1260,500,500,0,0\n4,0,0,0,0,1\n6,0,0,0,0,1";
+    fs::write(path("torques.csv"), torques).unwrap();
+    fs::write(path("mine.toml"), "preset = 'NEWS-8000'\nlast_span_m = 3\n").unwrap();
+    let sweep = "machine = 'mine.toml'\n[vary]\nnips.slip = [true, false]\n\
+                 [vary.web]\nstiffness_n_m = {from = 2e5, to = 3e5, steps = 3}\n";
+    fs::write(path("sweep.toml"), sweep).unwrap();
+    let run = |machine: Option<String>, sweep: Option<&str>, scalar| {
+        let options = Options {
+            schedule: path("torques.csv"),
+            out: path("out.csv"),
+            machine,
+            scalar,
+            every_s: 6.0,
+            sweep: sweep.map(path),
+        };
+        let mut said = Vec::new();
+        plant::run(&options, &mut said).unwrap();
+        let said = String::from_utf8(said).unwrap();
+        let out = fs::read_to_string(path("out.csv")).unwrap();
+        let lines = out
+            .lines()
+            .map(|line| line.split(',').map(str::to_owned).collect());
+        (said, lines.collect::<Vec<Vec<_>>>())
+    };
+    for scalar in [None, Some(Scalar::F64), Some(Scalar::Fixed)] {
+        let (said, rows) = run(None, Some("sweep.toml"), scalar);
+        assert!(said.contains("out.csv: 6 runs of 6 s in "), "{said}");
+        let header = "nips.slip,web.stiffness_n_m,largest_t,largest_t_s,smallest_t,\
+                      v_uw,v_gr,v_sr,v_rd,t_uw,t_gr,t_sr,r_uw,r_wu,web_break_s,slip_s,burst_s";
+        assert_eq!(rows[0].join(","), header);
+        assert_eq!(rows.len(), 7);
+        let slips = ["true", "false"].iter();
+        let pairs = slips.flat_map(|slip| ["200000.0", "250000.0", "300000.0"].map(|k| (*slip, k)));
+        for (row, (slip, stiffness)) in rows[1..].iter().zip(pairs) {
+            assert_eq!((row[0].as_str(), row[1].as_str()), (slip, stiffness));
+            let machine = format!(
+                "preset = 'NEWS-8000'\nlast_span_m = 3\nnips.slip = {slip}\nweb.stiffness_n_m = {stiffness}\n"
+            );
+            fs::write(path("one.toml"), machine).unwrap();
+            let one = path("one.toml").to_str().unwrap().to_owned();
+            let (_, single) = run(Some(one), None, Some(scalar.unwrap_or(Scalar::F32)));
+            assert_eq!(row[5..14], single.last().unwrap()[1..]);
+            assert_eq!(row[14..], ["", "", ""]);
+        }
+    }
+}
+
+#[test]
+fn a_sweep_that_is_refused_leaves_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(
+        path("torques.csv"),
+        "t_s,T_uw,T_rd,T_fd,T_rr\n0,0,0,0,0\n1,0,0,0,0",
+    )
+    .unwrap();
+    fs::write(path("sweep.toml"), "[vary]\nweb.width_m = [6, 16]\n").unwrap();
+    let options = Options {
+        schedule: path("torques.csv"),
+        out: path("out.csv"),
+        machine: None,
+        scalar: None,
+        every_s: 1.0,
+        sweep: Some(path("sweep.toml")),
+    };
+    let error = format!("{:#}", plant::run(&options, &mut Vec::new()).unwrap_err());
+    assert!(
+        error.ends_with("sweep.toml:2: web.width_m = 16 is outside 0.05 to 15"),
+        "{error}"
+    );
+    assert!(!path("out.csv").exists());
 }
 
 /// `cargo test --release -p host-tests --test batch -- --ignored --nocapture`

@@ -10,8 +10,8 @@
 //!   the smallest;
 //! - the speeds, tensions and radii at the end, as [`plant`] names them;
 //! - `web_break_s`, `slip_s`, `burst_s`: when the web broke, when a roll of the windup first lost traction, when the
-//!   shipping roll burst, s; empty where it did not. Before the tension that breaks it, the web is whole, and
-//!   after it there is none: `largest_t` does not show it.
+//!   shipping roll burst, s; empty where it did not. The last two are known only of machines that may slip or whose
+//!   layers compress. A web that breaks has no tension at the end of that step: `largest_t` is the one before.
 
 pub mod group;
 pub mod lanes;

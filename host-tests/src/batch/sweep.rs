@@ -354,3 +354,151 @@ fn varied(machine: &Machine) -> impl Iterator<Item = &'static Parameter> {
 fn rounded(x: f64) -> f64 {
     format!("{x:.DECIMALS$e}").parse().unwrap_or(x)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Sweep> {
+        Sweep::read("s.toml", text, Path::new(""), None)
+    }
+
+    #[test]
+    fn there_is_a_run_for_each_combination_the_last_parameter_fastest() {
+        let sweep = read(
+            "machine = 'LAB-300'\n[vary]\n'idle[1].friction_n_s_m' = [1, 2.5]\nnips = { slip = [true, false] }\n\
+             load_cells.roll = [1, 0]\nweb.stiffness_n_m = { from = 1e5, to = 2e5, steps = 11 }\n",
+        )
+        .unwrap();
+        assert_eq!((sweep.runs(), sweep.spans()), (88, 3));
+        let runs: Vec<_> = (0..88).map(|run| sweep.describe(run)).collect();
+        let about = |friction, slip, roll, k: &str| {
+            format!(
+                "idle[1].friction_n_s_m = {friction}, nips.slip = {slip}, load_cells.roll = {roll}, \
+                 web.stiffness_n_m = {k}"
+            )
+        };
+        assert_eq!(runs[0], about("1.0", true, 1, "100000.0"));
+        assert_eq!(runs[1], about("1.0", true, 1, "110000.0"));
+        assert_eq!(runs[10], about("1.0", true, 1, "200000.0"));
+        assert_eq!(runs[11], about("1.0", true, 0, "100000.0"));
+        assert_eq!(runs[87], about("2.5", false, 0, "200000.0"));
+        let lab = Description::find("LAB-300").unwrap().machine;
+        let mut last = lab.clone();
+        last.idle[1].friction_n_s_m = 2.5;
+        last.web.stiffness_n_m = 2e5;
+        last.nips.slip = false;
+        last.load_cells.roll = 0;
+        assert_eq!(sweep.machine(87), last);
+    }
+
+    #[test]
+    fn the_command_line_names_another_machine() {
+        let text = "machine = 'NEWS-8000'\n[vary]\nweb.width_m = [1, 2]";
+        let sweep = Sweep::read("s.toml", text, Path::new(""), Some("NEWS-8000-UNLUMPED"));
+        assert_eq!(sweep.unwrap().spans(), 8);
+    }
+
+    #[test]
+    fn bad_files_are_refused_with_file_line_and_reason() {
+        for (text, reason) in [
+            ("", "s.toml: nothing is varied: vary.<parameter> = "),
+            ("[vary]", "s.toml:1: nothing is varied"),
+            ("vary = 3", "s.toml:1: vary = 3 is not a table"),
+            ("[vary]\nweb.width_m = ", "s.toml:2: "),
+            ("very = 3", "s.toml:1: very is neither machine nor vary"),
+            ("machine = 3\n[vary]", "s.toml:1: machine = 3 is not a name"),
+            (
+                "machine = 'NEWS-9'\n[vary]",
+                "s.toml:1: \"NEWS-9\" is neither a machine nor a file; the machines are NEWS-8000, ",
+            ),
+            (
+                "[vary]\n'web.widht_m' = [1]",
+                "s.toml:2: there is no parameter web.widht_m to vary; the nearest is web.width_m",
+            ),
+            (
+                "[vary]\nwep.width_m = [1]",
+                "s.toml:2: there is no parameter wep to vary; ",
+            ),
+            (
+                "[vary]\n[vary.web]\nwidht_m = [1]",
+                "s.toml:3: there is no parameter web.widht_m to vary; the nearest is web.width_m",
+            ),
+            (
+                "[vary]\n'idle[2].span_m' = [1]",
+                "s.toml:2: there is no parameter idle[2].span_m to vary; the nearest is idle[0].span_m",
+            ),
+            (
+                "[vary]\n'idle (number of rolls)' = [2]",
+                "s.toml:2: there is no parameter idle (number of rolls) to vary; ",
+            ),
+            (
+                "[vary]\nweb = [1]",
+                "s.toml:2: there is no parameter web to vary; ",
+            ),
+            (
+                "[vary]\nweb.width_m = 6",
+                "s.toml:2: web.width_m = 6 is neither a list of values nor { from, to, steps }",
+            ),
+            (
+                "[vary]\nweb.width_m = []",
+                "s.toml:2: web.width_m is given no value",
+            ),
+            (
+                "[vary]\nweb.width_m = [1, true]",
+                "s.toml:2: web.width_m = true is not a number",
+            ),
+            (
+                "[vary]\nnips.slip = [0]",
+                "s.toml:2: nips.slip = 0 is not true or false",
+            ),
+            (
+                "[vary]\nload_cells.roll = [-1]",
+                "s.toml:2: load_cells.roll = -1 is not a whole number from 0",
+            ),
+            (
+                "[vary]\nload_cells.roll = {from=0, to=1, steps=2}",
+                "s.toml:2: load_cells.roll.from = 0: only numbers have others between them",
+            ),
+            (
+                "[vary]\nweb.width_m = {from=1, to=2}",
+                "s.toml:2: web.width_m.steps is missing",
+            ),
+            (
+                "[vary]\nweb.width_m = {from=1, to=2, step=2}",
+                "s.toml:2: web.width_m.step is none of from, to, steps",
+            ),
+            (
+                "[vary]\nweb.width_m = {from=1, to=2, steps=1}",
+                "s.toml:2: web.width_m.steps = 1 is not a whole number from 2 to 1000000",
+            ),
+            (
+                "[vary]\nweb.width_m = {from=1, to=inf, steps=3}",
+                "s.toml:2: web.width_m.to = inf: ",
+            ),
+            (
+                "[vary]\n'web.width_m' = [1]\nweb.width_m = [2]",
+                "s.toml:3: web.width_m stands twice",
+            ),
+            (
+                "[vary]\nweb.width_m = [6, 16]",
+                "s.toml:2: web.width_m = 16 is outside 0.05 to 15",
+            ),
+            (
+                "[vary]\nweb.width_m = [nan]",
+                "s.toml:2: web.width_m = NaN is outside 0.05 to 15",
+            ),
+            (
+                "[vary]\nweb.width_m = [6, 7]\nweb.strength_n_m = [2000, 500]",
+                "s.toml:2: operation.tension_n_m = 350 is outside 1 to 250: with web.width_m = 6.0, web.strength_n_m = 500.0",
+            ),
+            (
+                "\n[vary]\nweb.width_m = {from=1, to=2, steps=1000}\nlast_span_m = {from=1, to=2, steps=1001}",
+                "s.toml:2: 1000·1001 runs are more than 1000000",
+            ),
+        ] {
+            let error = format!("{:#}", read(text).expect_err(text));
+            assert!(error.starts_with(reason), "{text:?}: {error}");
+        }
+    }
+}
