@@ -219,7 +219,7 @@ struct Pack<const SPANS: usize> {
     lanes: Set,
     sums: Sums<SPANS>,
     web: Web<Lanes, SPANS>,
-    load: Load<Lanes, Whole<Lanes>, SPANS>,
+    load: Load<'static, Lanes, Whole<Lanes>, SPANS>,
 }
 
 impl<const SPANS: usize> Group<SPANS> {
@@ -306,7 +306,7 @@ impl<const SPANS: usize> Group<SPANS> {
         for _ in 0..self.substeps {
             self.motion.advance(&mut sums, &web, &self.whole.load);
             let x = sums.map(|sum| sum.value);
-            web = self.motion.web(&x, &None);
+            web = self.motion.web(&x, None);
             reached = reached.or(lanes::at_limit(&self.limits, &x, Some(&web)));
         }
         for lane in reached.and(self.whole.lanes).iter() {
@@ -359,9 +359,7 @@ impl<const SPANS: usize> Group<SPANS> {
         if run.winder.threaded() {
             self.extremes.put(lane, &run.extremes);
             self.whole.take(lane, run.winder.sums());
-            self.whole.web = self
-                .motion
-                .web(&self.whole.sums.map(|sum| sum.value), &None);
+            self.whole.web = self.motion.web(&self.whole.sums.map(|sum| sum.value), None);
         } else {
             self.broken.take(lane, run.winder.sums());
         }

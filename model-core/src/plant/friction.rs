@@ -187,8 +187,8 @@ impl Delay {
         self.history >> self.steps & 1 == 1
     }
 
-    /// The signal has been off for `delay_s`: as long as it stays off, nothing comes out.
+    /// The signal has been off for longer than `delay_s`: as long as it stays off, a step changes nothing.
     pub fn rests(&self) -> bool {
-        self.history & ((1 << self.steps) - 1) == 0
+        !self.last && self.steady > self.steps
     }
 }

@@ -20,7 +20,8 @@ use crate::exchange::{Brakes, BySection};
 use crate::real::Scalar;
 
 impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
-    /// Nothing but its motion moves the winder in a step with these brakes commanded, if nobody handles it.
+    /// Nothing but its motion moves the winder in a step with these brakes commanded, if nobody handles it and no
+    /// fault is put in.
     pub fn glides(&self, brakes: &Brakes<bool>) -> bool {
         let open = |delay: &Delay, on: bool| !on && delay.rests();
         let apart = self.holders.winds() || self.eccentricity.present();
@@ -31,7 +32,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     }
 
     /// What drives it under these torques while it glides.
-    pub fn load(&self, torque: &BySection<R::Si>) -> Load<R, Whole<R>, SPANS> {
+    pub fn load(&self, torque: &BySection<R::Si>) -> Load<'_, R, Whole<R>, SPANS> {
         let layer = if self.threaded { R::ONE } else { R::ZERO };
         Load {
             uw: R::of_si(torque.uw, self.scale.torque),
@@ -53,7 +54,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         self.state = *sums;
         self.closed = Brakes::default();
         if self.threaded {
-            self.look_at_web(&None);
+            self.look_at_web(None);
         }
     }
 }
