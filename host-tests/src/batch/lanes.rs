@@ -226,8 +226,10 @@ pub fn at_limit<const SPANS: usize>(
     x: &State<Lanes, SPANS, 0>,
     web: Option<&Web<Lanes, SPANS>>,
 ) -> Set {
-    let sum = x.iter().fold(Lanes::ZERO, |sum, x| sum + x).0;
-    let mut reached = !sum.is_finite() | x.r_wu.0.simd_lt(limits.bare_radius.0);
+    // as one winder asks it: what is not finite makes the sum so
+    let mut sum = Lanes::ZERO;
+    x.map(|x| sum += x);
+    let mut reached = !sum.0.is_finite() | x.r_wu.0.simd_lt(limits.bare_radius.0);
     if let Some(web) = web {
         let (_, highest) = range(&web.tension);
         reached = reached
