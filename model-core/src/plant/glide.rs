@@ -36,7 +36,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let layer = if self.threaded { R::ONE } else { R::ZERO };
         Load {
             uw: R::of_si(torque.uw, self.scale.torque),
-            windup: self.whole(&self.holders.contact.drive(torque)),
+            windup: self.whole(torque),
             layer,
             threaded: self.threaded,
             offsets: None,

@@ -382,9 +382,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         if self.holders.winds() || self.closed.rd || self.closed.fd {
             self.turn_held_windup(&actuators.torque, &load);
         } else {
-            let BySection { rd, fd, rr, .. } = actuators.torque;
-            let torque = [rd, fd, rr].map(|torque| R::of_si(torque, self.scale.torque_rolls));
-            self.turn_windup(self.motion.windup.pull(torque), &load);
+            self.turn_windup(self.whole(&actuators.torque), &load);
         }
         if unwind.sticks {
             self.state.omega_uw = R::Sum::at(R::ZERO);
@@ -404,9 +402,16 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     }
 
     /// Moves everything, the windup as one body.
-    fn turn_windup(&mut self, force: R, load: &Load<R, (), SPANS>) {
-        let load = load.on(Whole(force));
+    fn turn_windup(&mut self, whole: Whole<R>, load: &Load<R, (), SPANS>) {
+        let load = load.on(whole);
         self.motion.advance(&mut self.state, &self.web, &load);
+    }
+
+    /// What drives the windup as one body.
+    fn whole(&self, torque: &BySection<R::Si>) -> Whole<R> {
+        let torque = [torque.rd, torque.fd, torque.rr];
+        let torque = torque.map(|torque| R::of_si(torque, self.scale.torque_rolls));
+        Whole(self.motion.windup.pull(torque))
     }
 
     /// Moves everything, the windup with its brakes and nips. Not inlined: the step without them is shorter so.
@@ -419,7 +424,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let parts = &holding.parts;
         if parts.nips.iter().all(|nip| *nip == Nip::Sticks) {
             let [rd, fd, rr] = parts.drive;
-            self.turn_windup(R::of_si(rd + fd + rr, self.scale.force), load);
+            self.turn_windup(Whole(R::of_si(rd + fd + rr, self.scale.force)), load);
             self.apart = [self.state.v[SPANS - 1]; ROLLS];
         } else {
             let parts = parts.map(|force| R::of_si(force, self.scale.force));
