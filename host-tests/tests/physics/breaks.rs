@@ -1,15 +1,18 @@
 //! Web break: by strength, by the end of the parent roll, and what is left of it.
 
+use std::f64::consts::PI;
+
 use model_core::machine::Machine;
 use model_core::real::Float;
 
 use crate::form::{self, Bench, H};
-use crate::in_both_scalars;
+use crate::{in_both_scalars, near};
 
 in_both_scalars!(
     the_web_breaks_above_its_strength,
     the_web_parts_when_the_parent_roll_runs_out,
     a_commanded_break_is_the_same,
+    the_tail_is_wound_up,
 );
 
 /// No tension, radii hold, rolls turn on; threading makes it whole again.
@@ -75,4 +78,32 @@ fn a_commanded_break_is_the_same<R: Float>() {
     let mut bench = running::<R>(1.0);
     bench.winder.break_web();
     is_broken(&mut bench);
+}
+
+/// Where it is wanted, what hangs between the break and the drum still goes onto the roll: π·ΔR²/z = L, and no more.
+fn the_tail_is_wound_up<R: Float>() {
+    let mut m = Machine::news_8000();
+    m.web.tail = true;
+    let x = form::steady(
+        &m,
+        10.0,
+        form::tension(&m),
+        m.parent_roll.expire_radius_m,
+        0.3,
+    );
+    let mut bench = Bench::threaded(m.clone(), &x);
+    // the roll has run out in the first span
+    bench.step(&Default::default());
+    let before = bench.x();
+    assert!(!bench.winder.threaded());
+    let tail = 0.5 * 6.0 + 3.0 + 2.5;
+    for _ in 0..(5.0 / H) as u32 {
+        bench.step(&Default::default());
+    }
+    let x = bench.x();
+    let gained = PI * (x.r_wu.powi(2) - before.r_wu.powi(2)) / m.web.caliper_m;
+    // it ends with the step in which it does
+    near("tail in m", gained, tail, 10.0 * H + 0.01);
+    assert!(gained >= tail - 0.01, "{gained} m");
+    assert_eq!(x.r_uw, before.r_uw);
 }

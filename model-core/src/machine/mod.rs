@@ -33,6 +33,8 @@ pub struct Web {
     pub retardation_s: f64,
     /// Ultimate tensile strength per width, N/m.
     pub strength_n_m: f64,
+    /// Whether the web between a break and the rear drum is wound up as well; otherwise the radii hold at once.
+    pub tail: bool,
 }
 
 impl Web {
@@ -310,6 +312,12 @@ impl Machine {
         self.idle
             .get(i)
             .map_or(self.last_span_m, |roll| roll.span_m)
+    }
+
+    /// Length of the web from the middle of span `i` to the rear drum, m: the tail that a break there leaves.
+    pub fn tail_m(&self, i: usize) -> f64 {
+        let after: f64 = (i + 1..=self.idle.len()).map(|i| self.span_m(i)).sum();
+        0.5 * self.span_m(i) + after
     }
 
     /// Length of the web from the unwind to the rear drum, m.

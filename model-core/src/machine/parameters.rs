@@ -313,6 +313,7 @@ static TABLE: &[&[Parameter]] = &[
         stiffness_n_m "N/m", 1e3..=1e8, "stiffness per width E·z";
         retardation_s "s", 0.0..=0.05, "retardation time of the Kelvin–Voigt web τ_v";
         strength_n_m "N/m", 10.0..=1e6, "ultimate tensile strength per width";
+        tail "", 0.0..=1.0, "the web between a break and the rear drum is wound up, too";
     }),
     part!(|m, i| (parent_roll) {
         spool_radius_m "m", 0.02..=2.0, "radius of the empty spool";

@@ -79,6 +79,7 @@ impl Machine {
                 stiffness_n_m: 260e3,
                 retardation_s: 5e-3,
                 strength_n_m: 2.0e3,
+                tail: false,
             },
             parent_roll: ParentRoll {
                 full_radius_m: 1.50,
@@ -224,6 +225,7 @@ impl Machine {
                 caliper_m: 50e-6,
                 stiffness_n_m: 420e3,
                 strength_n_m: 3.0e3,
+                tail: false,
                 ..news.web
             },
             parent_roll: ParentRoll {

@@ -17,14 +17,14 @@ use super::rk4::State;
 use super::windup::Whole;
 use super::{Delay, Winder};
 use crate::exchange::{Brakes, BySection};
-use crate::real::Scalar;
+use crate::real::{Ring, Scalar};
 
 impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     /// Nothing but its motion moves the winder in a step with these brakes commanded, if nobody handles it and no
     /// fault is put in.
     pub fn glides(&self, brakes: &Brakes<bool>) -> bool {
         let open = |delay: &Delay, on: bool| !on && delay.rests();
-        let apart = self.holders.winds() || self.eccentricity.present();
+        let apart = self.holders.winds() || self.eccentricity.present() || self.tail > R::Si::ZERO;
         !apart
             && open(&self.delay.uw, brakes.uw)
             && open(&self.delay.rd, brakes.rd)

@@ -60,6 +60,10 @@ pub struct Winder<R: Scalar, const SPANS: usize> {
     threaded: bool,
     /// The span in which it has parted last, counted from the unwind; 0 while it is whole.
     broken_span: u8,
+    /// What a break in each span leaves before the rear drum, m; nothing where that is not wound up.
+    tails: [R::Si; SPANS],
+    /// What is left of it.
+    tail: R::Si,
     delay: Brakes<Delay>,
     closed: Brakes<bool>,
     nips: [Nip<R::Si>; ROLLS],
@@ -171,6 +175,14 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             web: Web::none(),
             threaded: false,
             broken_span: 0,
+            tails: core::array::from_fn(|i| {
+                R::Si::of(if machine.web.tail {
+                    machine.tail_m(i)
+                } else {
+                    0.0
+                })
+            }),
+            tail: R::Si::ZERO,
             delay: Brakes::all(Delay::new(machine.brakes.delay_s, h)),
             closed: Brakes::default(),
             nips: [Nip::Sticks; ROLLS],
@@ -197,6 +209,9 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             self.advance(actuators);
             self.break_web_if_due();
         }
+        if self.tail > R::Si::ZERO {
+            self.tail -= self.state.travel.value().to_si(self.scale.travel);
+        }
         self.measure(&actuators.faults.sensors)
     }
 
@@ -215,6 +230,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     /// The web parts: all tensions go to zero and stay there until it is threaded again.
     pub fn break_web(&mut self) {
         self.threaded = false;
+        self.tail = R::Si::ZERO;
         self.state.strain = [R::Sum::at(R::ZERO); SPANS];
         self.web = Web::none();
     }
@@ -222,7 +238,9 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     /// The same in the span of an index.
     fn break_web_in(&mut self, span: usize) {
         self.break_web();
-        self.broken_span = (span.min(SPANS - 1) + 1) as u8;
+        let span = span.min(SPANS - 1);
+        self.tail = self.tails[span];
+        self.broken_span = (span + 1) as u8;
     }
 
     /// The span in which the web has parted, counted from the unwind; 0 while it is whole, or taken out.
@@ -330,6 +348,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
 
     fn thread_with(&mut self, strain: R) {
         self.threaded = true;
+        self.tail = R::Si::ZERO;
         self.broken_span = 0;
         self.state.strain = [R::Sum::at(strain); SPANS];
         self.look_at_web(None);
@@ -359,7 +378,12 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             self.look_at_web(offsets.as_ref());
         }
         let layer = if !self.threaded {
-            R::ZERO
+            // the tail of a broken web, as it comes
+            if self.tail > R::Si::ZERO {
+                R::ONE
+            } else {
+                R::ZERO
+            }
         } else if self.holders.nips.compress() {
             let thickness = self.holders.nips.thickness(self.winding.wound_on_tension);
             R::of_si(thickness, self.scale.one)
