@@ -145,7 +145,6 @@ impl<R: Real> Sum<R> for Compensated<R> {
     fn value(&self) -> R {
         self.value
     }
-    #[inline(always)]
     fn add(&mut self, increment: R) {
         self.add(increment);
     }

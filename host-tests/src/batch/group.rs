@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use anyhow::{Result, bail};
-use model_core::exchange::{Actuators, Brakes};
+use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::machine::{Machine, MachineError};
 use model_core::plant::motion::{Load, Motion};
 use model_core::plant::rk4::State;
@@ -281,11 +281,8 @@ impl<const SPANS: usize> Group<SPANS> {
         if actuators.brakes != Brakes::default() {
             self.part();
         }
-        let last = self.runs.len() - 1;
-        let of = |lane: usize| self.runs[lane.min(last)].winder.load(&actuators.torque);
-        let loads: [_; LANES] = std::array::from_fn(of);
-        let uw = Lanes::each(|lane| loads[lane].uw);
-        let windup = Whole(Lanes::each(|lane| loads[lane].windup.0));
+        let BySection { uw, rd, fd, rr } = actuators.torque.map(Lanes::all);
+        let windup = Whole(self.motion.windup.pull([rd, fd, rr]));
         for pack in [&mut self.whole, &mut self.broken] {
             (pack.load.uw, pack.load.windup) = (uw, windup);
         }

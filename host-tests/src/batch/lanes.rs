@@ -1,7 +1,8 @@
 //! Sixteen numbers in single precision, one for each of sixteen winders side by side.
 //!
 //! Not here: anything that one lane decides for itself. Every operation is that of `f32`, lane by lane and correctly
-//! rounded, so that a winder in a lane has the bits of one that is computed alone.
+//! rounded, so that a winder in a lane has the bits of one that is computed alone, as long as all its numbers are
+//! numbers.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -119,16 +120,16 @@ impl Ring for Lanes {
     const ONE: Self = Self(f32x16::ONE);
 }
 
-/// As that of `f32`, operation by operation.
+/// As that of `f32`, operation by operation; only the maximum of 0 and what is not a number is another.
 impl Arithmetic for Lanes {
     type Gain = Self;
     type Rate = Self;
     type Sum = Compensated<Self>;
 
-    /// A comparison, for the maximum of a register has its own way with −0 and with what is not a number.
+    /// A comparison that lets through what is not a number, so that it shows in the end, see [`at_limit`].
     #[inline(always)]
     fn positive(self) -> Self {
-        Self(self.0.simd_gt(f32x16::ZERO).select(self.0, f32x16::ZERO))
+        Self(self.0.simd_le(f32x16::ZERO).select(f32x16::ZERO, self.0))
     }
     #[inline(always)]
     fn stretch(strain: Self) -> Self {
@@ -231,10 +232,10 @@ pub fn at_limit<const SPANS: usize>(
     x.map(|x| sum += x);
     let mut reached = !sum.0.is_finite() | x.r_wu.0.simd_lt(limits.bare_radius.0);
     if let Some(web) = web {
-        let (_, highest) = range(&web.tension);
-        reached = reached
-            | !highest.0.simd_le(limits.strength.0)
-            | x.r_uw.0.simd_le(limits.expire_radius.0);
+        for t in &web.tension {
+            reached |= !t.0.simd_le(limits.strength.0);
+        }
+        reached |= x.r_uw.0.simd_le(limits.expire_radius.0);
     }
     Set(reached.to_bitmask() as u16)
 }

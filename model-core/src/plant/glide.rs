@@ -5,18 +5,17 @@
 //! Most winders glide most of the time: brakes open, rolls round and sticking to each other, layers of one thickness.
 //! A step is then the same for all of them:
 //!
-//! - [`Motion::advance`](super::motion::Motion::advance) under [`Winder::load`], [`Winder::substeps`] times, the way
+//! - [`Motion::advance`](super::motion::Motion::advance) under the motors' torques, [`Winder::substeps`] times, the way
 //!   counted from zero;
-//! - each time the web of the new state, and whether its [`Limits`](super::Limits) still hold.
+//! - each time the web of the new state, and whether its [`Limits`](super::Limits) still hold and all is finite.
 //!
 //! So that several winders can be moved at once, each gives away its [`Winder::sums`], and takes them back with
 //! [`Winder::resume`] where one of them comes to a limit. That step it does by itself, from the sums before it.
 
-use super::motion::Load;
+use super::Winder;
+use super::friction::Delay;
 use super::rk4::State;
-use super::windup::Whole;
-use super::{Delay, Winder};
-use crate::exchange::{Brakes, BySection};
+use crate::exchange::Brakes;
 use crate::real::{Ring, Scalar};
 
 impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
@@ -29,18 +28,6 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             && open(&self.delay.uw, brakes.uw)
             && open(&self.delay.rd, brakes.rd)
             && open(&self.delay.fd, brakes.fd)
-    }
-
-    /// What drives it under these torques while it glides.
-    pub fn load(&self, torque: &BySection<R::Si>) -> Load<'_, R, Whole<R>, SPANS> {
-        let layer = if self.threaded { R::ONE } else { R::ZERO };
-        Load {
-            uw: R::of_si(torque.uw, self.scale.torque),
-            windup: self.whole(torque),
-            layer,
-            threaded: self.threaded,
-            offsets: None,
-        }
     }
 
     /// The state variables as they are summed up.
