@@ -345,8 +345,6 @@ pub struct DriveCommand<R> {
     pub acceleration: R,
     /// Limit of its rate, m/s³.
     pub jerk: R,
-    /// The ramp stands still.
-    pub freeze_ramp: bool,
     /// Tension to go to, N.
     pub tension: R,
     /// Radius of the parent roll to take over, m.

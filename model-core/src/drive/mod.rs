@@ -157,7 +157,7 @@ impl<R: Real> Drive<R> {
         let alone = command.unwind == UnwindControl::Speed;
         if !(command.drums || alone) || tuned == Some(Loop::DrumSpeed) {
             self.speed.set(v);
-        } else if !command.freeze_ramp {
+        } else {
             self.speed
                 .step(command.v_target, command.acceleration, command.jerk);
         }

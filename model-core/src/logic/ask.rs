@@ -42,7 +42,6 @@ impl<R: Real> Logic<R> {
             v_target: row.v,
             acceleration: row.limits.0,
             jerk: row.limits.1,
-            freeze_ramp: false,
             tension: row.tension,
             preset: self.one_shot.preset,
             freeze_diameter: matches!(self.mode, Mode::WebBreakStop | Mode::UnwindManeuver),
