@@ -90,6 +90,15 @@ pub struct Handling {
     pub remove_web: bool,
 }
 
+/// What the rider roll is to do. At rest it lies on the shipping roll with the load of the machine's table.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rider<R> {
+    /// Lifted off the shipping roll.
+    pub lifted: bool,
+    /// Load beside that of the table, as a share of it.
+    pub load_trim: R,
+}
+
 /// How a brake fails.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stuck {
@@ -159,6 +168,8 @@ pub struct Actuators<R> {
     pub torque: BySection<R>,
     /// Brakes commanded on.
     pub brakes: Brakes<bool>,
+    /// The rider roll.
+    pub rider: Rider<R>,
     /// What people do.
     pub handling: Handling,
     /// Faults that a test puts in.
@@ -172,12 +183,14 @@ pub struct Measurements<R> {
     pub omega: BySection<R>,
     /// Web tension from the load cells, N, total across the width.
     pub tension: R,
-    /// Shipping-roll diameter from the position of the rider-roll beam, m.
+    /// Shipping-roll diameter from the position of the rider-roll beam, m; of a lifted roll the last one.
     pub d_wu: R,
     /// Pulses of the rear drum's encoder since power-up; wraps.
     pub pulses_rd: u32,
     /// Brakes that are closed.
     pub brakes: Brakes<bool>,
+    /// The rider roll is off the shipping roll.
+    pub rider_lifted: bool,
 }
 
 /// How the unwind is controlled.
@@ -345,10 +358,10 @@ pub struct DriveCommand<R> {
     pub acceleration: R,
     /// Limit of its rate, m/s³.
     pub jerk: R,
-    /// The ramp stands still.
-    pub freeze_ramp: bool,
     /// Tension to go to, N.
     pub tension: R,
+    /// The tension loop is open: the unwind pulls what the reference says, whatever the load cells show.
+    pub tension_open: bool,
     /// Radius of the parent roll to take over, m.
     pub preset: Option<R>,
     /// The web is gone: hold the diameter estimate.
@@ -361,6 +374,8 @@ pub struct DriveCommand<R> {
     pub front_share_trim: R,
     /// Brakes on.
     pub brakes: Brakes<bool>,
+    /// The rider roll; its drive coasts while it is lifted.
+    pub rider: Rider<R>,
     /// What people do, handed on to the plant.
     pub handling: Handling,
     /// Faults that a test puts in, handed on to the plant.
@@ -396,6 +411,8 @@ pub struct DriveStatus<R> {
     pub load: BySection<R>,
     /// Shaft powers, W.
     pub power: BySection<R>,
+    /// Load of the rider roll per width as it is set, N/m.
+    pub rider_load: R,
     /// Motors that have used up their overload and are limited to rated torque.
     pub overloaded: BySection<bool>,
     /// Auto-tune.

@@ -4,8 +4,9 @@
 //! the HMI's interface and the signal list all come from [`SIGNALS`].
 //!
 //! Two blocks of 16-bit words, commands from the PLC and feedback to it, without holes. The commands of a winder PLC
-//! come first; behind them stand the faults that a test puts in, out of reach of a PLC that writes its own words. A
-//! block is only ever added to: an address keeps its meaning. A value is a scaled
+//! come first; behind them stand the faults that a test puts in, out of reach of a PLC that writes its own words, and
+//! behind those the PLC's words that were added since. In all words but the first 20, 0 changes nothing, so that a PLC
+//! may write the whole block as well as its two parts. A block is only ever added to: an address keeps its meaning. A value is a scaled
 //! integer; a 32-bit counter takes two words, high word first. Bit `b` of word `w` is also the single bit
 //! `16·w + b` of the block, so that a PLC can use coils or words as it likes.
 
@@ -88,6 +89,10 @@ signals! {
     FAULT_PRESET:     Command 28, Simulator, I16, "%", 10.0, -10.0 ..= 10.0, "Error of a diameter preset when the drive takes it over";
     BUS_DELAY:        Command 29, Simulator, U16, "", 1.0, 1.0 ..= 10.0, "Drive cycles from a command to its effect, and from a feedback to its sight";
 
+    // more of the PLC's, where no address moves for them; 0 in all of them is what a PLC without them gets
+    WINDER_COMMAND_2: Command 30, Winder, Bits(logic::COMMAND_2_BITS), "", 1.0, 0.0 ..= 65535.0, "More commands to the winder's drive logic";
+    RIDER_LOAD_SET:   Command 31, RiderRoll, U16, "%", 10.0, 0.0 ..= 200.0, "Load of the rider roll, of the machine's table; 0 is the table's own, as 100 is";
+
     // what the drive system answers
     HEARTBEAT:        Feedback 0,  Winder, U16, "", 1.0, 0.0 ..= 65535.0, "Counts up by one each drive cycle of 10 ms";
     WINDER_STATUS:    Feedback 1,  Winder, Bits(logic::STATUS_BITS), "", 1.0, 0.0 ..= 65535.0, "State of the winder's drive logic";
@@ -146,6 +151,9 @@ signals! {
     AUTOTUNE_GAIN_NEW: Feedback 58, Winder, U32, "", 1000.0, 0.0 ..= 4.0e6, "Proportional gain that auto-tune has found";
     AUTOTUNE_TIME_OLD: Feedback 60, Winder, U16, "s", 1000.0, 0.0 ..= 65.0, "Integral action time before auto-tune";
     AUTOTUNE_TIME_NEW: Feedback 61, Winder, U16, "s", 1000.0, 0.0 ..= 65.0, "Integral action time that auto-tune has found";
+    RIDER_LOAD:       Feedback 62, RiderRoll, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Load of the rider roll per width, as it is set";
+    NIP_LOAD_RD:      Feedback 63, Simulator, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Load of the rear drum's nip per width, where slip or compression is computed";
+    NIP_LOAD_FD:      Feedback 64, Simulator, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Load of the front drum's nip per width, where slip or compression is computed";
 }
 
 /// Jog speed at power-up, m/min.
@@ -155,7 +163,7 @@ const HEARTBEAT_MS: f32 = 500.0;
 
 /// Words in the block of commands.
 pub const COMMAND_WORDS: usize = block_words(Direction::Command);
-/// Words of it that are a winder PLC's; what follows is the simulator's own.
+/// Words at its beginning that are a winder PLC's; the simulator's own follow.
 pub const PLC_COMMAND_WORDS: usize = FAULT_MACHINE.word as usize;
 /// Words in the block of feedback.
 pub const FEEDBACK_WORDS: usize = block_words(Direction::Feedback);
@@ -297,18 +305,14 @@ mod tests {
         }
     }
 
-    /// A winder PLC writes the first words and nothing of the simulator's.
+    /// A winder PLC writes the first words, and those behind the simulator's.
     #[test]
-    fn the_words_of_the_plc_come_first() {
+    fn the_words_of_the_plc_stand_before_and_behind_the_simulator_s() {
         for s in SIGNALS.iter().filter(|s| s.direction == Direction::Command) {
-            let of_simulator = s.section == Section::Simulator;
-            assert_eq!(
-                of_simulator,
-                usize::from(s.word) >= PLC_COMMAND_WORDS,
-                "{}",
-                s.name
-            );
+            let of_simulator = (FAULT_MACHINE.word..=BUS_DELAY.word).contains(&s.word);
+            assert_eq!(s.section == Section::Simulator, of_simulator, "{}", s.name);
         }
+        assert_eq!(PLC_COMMAND_WORDS, usize::from(FAULT_MACHINE.word));
     }
 
     #[test]

@@ -41,6 +41,8 @@ pub struct Truth {
     pub sliding: u8,
     /// Wound-on tension per width, N/m; 0 where it is not computed.
     pub wound_on_tension: u16,
+    /// Loads of the drums' nips per width, rear and front, N/m; 0 where they are not computed.
+    pub nip_load: [u16; 2],
     /// The shipping roll has burst.
     pub burst: bool,
 }
@@ -49,11 +51,13 @@ impl Truth {
     fn of<R: Scalar, const SPANS: usize>(winder: &Winder<R, SPANS>) -> Self {
         let winding = winder.winding();
         let [rd, fd, rr] = winding.slides.map(u8::from);
+        let [load_rd, load_fd, _] = winding.nip_load.map(R::Si::to_f32);
         Self {
             broken_span: winder.broken_span(),
             sliding: rd | fd << 1 | rr << 2,
-            // the cast saturates
+            // the casts saturate
             wound_on_tension: winding.wound_on_tension.to_f32() as u16,
+            nip_load: [load_rd as u16, load_fd as u16],
             burst: winding.burst,
         }
     }
@@ -197,5 +201,7 @@ pub fn logic_tick<R: Real>(
     let burst = u16::from(truth.burst) << 3;
     feedback.set_word(&image::WINDING, u16::from(truth.sliding) | burst);
     feedback.set_word(&image::WOUND_ON_TENSION, truth.wound_on_tension);
+    feedback.set_word(&image::NIP_LOAD_RD, truth.nip_load[0]);
+    feedback.set_word(&image::NIP_LOAD_FD, truth.nip_load[1]);
     logic.step(commands, measurements, status, feedback)
 }

@@ -3,7 +3,7 @@
 use crate::operator::{CYCLE, Operator};
 use crate::{near, put, running_at};
 use model_core::image;
-use model_core::logic::{Fault, Mode, command, inject, status};
+use model_core::logic::{Fault, Mode, command, command_2, inject, status};
 
 /// Cycles from a command to the sight of its effect.
 fn round_trip(delay: u16) -> u32 {
@@ -25,6 +25,26 @@ fn the_delay_counts_in_both_directions() {
     // what is set beyond the limits is limited
     assert_eq!(round_trip(0), 1);
     assert_eq!(round_trip(99), 19);
+}
+
+/// The PLC's words behind the simulator's travel by the bus as its first ones do.
+#[test]
+fn all_words_of_the_plc_travel_by_the_bus() {
+    let mut o = Operator::<f32>::new();
+    put(&mut o, &image::BUS_DELAY, 5);
+    o.wait(0.5);
+    put(&mut o, &image::RIDER_LOAD_SET, 500);
+    let load = o.value(&image::RIDER_LOAD);
+    let time = o.until(1.0, |o| o.value(&image::RIDER_LOAD) < 0.6 * load);
+    // four cycles there, one for the regulators to take it, four back
+    near("load after", time, 10.0 * CYCLE, 0.5 * CYCLE);
+    put(&mut o, &image::FAULT_DRIVES, inject::BUS_SILENT);
+    put(&mut o, &image::WINDER_COMMAND_2, command_2::RIDER_UP);
+    o.wait(1.0);
+    assert!(!o.simulator.actuators().rider.lifted);
+    put(&mut o, &image::FAULT_DRIVES, 0);
+    o.wait(0.2);
+    assert!(o.simulator.actuators().rider.lifted);
 }
 
 /// The simulator's own words are never late, and the heartbeat of the drives is late by the delay.

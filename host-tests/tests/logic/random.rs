@@ -120,7 +120,8 @@ fn meddle(commands: &mut Commands, chance: &mut Chance, beats: bool) {
                 &image::FAULT_MACHINE,
                 &image::FAULT_SENSORS,
                 &image::FAULT_DRIVES,
-            ][chance.below(3) as usize];
+                &image::WINDER_COMMAND_2,
+            ][chance.below(4) as usize];
             commands.set_word(signal, chance.next() as u16 & chance.next() as u16);
         }
         26..=40 => {

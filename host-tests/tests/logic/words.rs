@@ -1,9 +1,11 @@
 //! Control and status words of the sections, bit by bit, and the drive that one of them is.
 
 use crate::operator::Operator;
-use crate::{in_mode, near, running_at};
+use crate::{TENSION, in_mode, near, put, running_at, threaded};
+use model_core::exchange::TuneAbort;
 use model_core::image::{self, Signal};
-use model_core::logic::{Mode, Refusal, command, status};
+use model_core::logic::{Fault, Mode, Refusal, command, command_2, status};
+use model_core::plant::nip::Nips;
 use model_core::profidrive::{stw1, zsw1};
 
 const SECTIONS: [(&Signal, &Signal); 4] = [
@@ -180,4 +182,148 @@ fn a_web_that_is_taken_out_is_out() {
     o.command(command::THREAD);
     o.wait(0.1);
     assert_eq!(o.refusal(), Refusal::WebNotThreaded);
+}
+
+/// Lifted, the rider roll has neither load nor torque, and its speed is its own; lowered, it lies on the roll again,
+/// with the load that the table has for the diameter.
+#[test]
+fn the_rider_roll_is_lifted_and_lowered() {
+    let mut o = running_at(600.0);
+    let table = |o: &Operator<f32>| {
+        let d = 1e-3 * o.value(&image::D_WU);
+        let points = &o.machine.nips.rider_load;
+        let next = points.iter().position(|p| p.diameter_m > d).unwrap();
+        let (a, b) = (&points[next - 1], &points[next]);
+        let share = (d - a.diameter_m) / (b.diameter_m - a.diameter_m);
+        a.load_n_m + share * (b.load_n_m - a.load_n_m)
+    };
+    assert!(o.is(status::RIDER_DOWN));
+    near("Q", o.value(&image::RIDER_LOAD), table(&o), 5.0);
+    assert_eq!(o.value(&image::NIP_LOAD_RD), 0.0, "not computed as yet");
+
+    put(&mut o, &image::WINDER_COMMAND_2, command_2::RIDER_UP);
+    o.wait(0.1);
+    let d = o.value(&image::D_WU);
+    o.wait(30.0);
+    assert!(!o.is(status::RIDER_DOWN));
+    for signal in [&image::RIDER_LOAD, &image::TORQUE_RR] {
+        assert_eq!(o.value(signal), 0.0, "{}", signal.name);
+    }
+    // the beam no longer follows the roll
+    assert_eq!(o.value(&image::D_WU), d);
+    assert!(2e3 * o.x().r_wu > d + 5.0);
+    let [_, rr, wu] = o.x().windup;
+    assert!(wu - rr > 0.5, "{rr} of {wu} m/s");
+    assert_eq!((o.mode(), o.fault()), (Mode::Run, Fault::None));
+
+    put(&mut o, &image::WINDER_COMMAND_2, 0);
+    o.wait(5.0);
+    assert!(o.is(status::RIDER_DOWN));
+    near("D", o.value(&image::D_WU), 2e3 * o.x().r_wu, 0.2);
+    near("Q", o.value(&image::RIDER_LOAD), table(&o), 5.0);
+    // the front drum had run ahead of a roll that lay on it so lightly
+    o.until(15.0, |o| {
+        o.image.feedback.word(&image::WINDING) & 0b111 == 0
+    });
+    let x = o.x();
+    assert_eq!(x.windup, [x.v[2]; 3], "all stick");
+}
+
+/// The load is a share of the table's; 0 is the table's own, as it is for a PLC that does not know the word.
+#[test]
+fn the_load_of_the_rider_roll_is_set_in_percent_of_its_table() {
+    let mut o = Operator::<f32>::new();
+    o.wait(0.1);
+    let table = o.value(&image::RIDER_LOAD);
+    near("Q", table, o.machine.nips.rider_load[0].load_n_m, 1.0);
+    for (set, share) in [
+        (0.0, 1.0),
+        (50.0, 0.5),
+        (200.0, 2.0),
+        (250.0, 2.0),
+        (100.0, 1.0),
+    ] {
+        // beyond the limits as the wire may have it
+        put(&mut o, &image::RIDER_LOAD_SET, (10.0 * set) as u16);
+        o.wait(0.1);
+        near("Q", o.value(&image::RIDER_LOAD), share * table, 1.0);
+        if set > 0.0 {
+            // a core weighs nothing: the nips are in proportion to Q
+            let nip = share * Nips::<f64>::new(&o.machine).loads(0.05)[0];
+            near("N", o.value(&image::NIP_LOAD_RD), nip, 1.0);
+            near("N", o.value(&image::NIP_LOAD_FD), nip, 1.0);
+        }
+    }
+}
+
+/// A roll that is held by its own little weight alone slides on the drums that pull it up.
+#[test]
+fn without_the_rider_roll_a_small_roll_slides() {
+    let slides = |bits| {
+        let mut o = threaded();
+        put(&mut o, &image::WINDER_COMMAND_2, bits);
+        o.command(command::RUN);
+        let mut slid = 0;
+        o.wait_with(20.0, |o| {
+            slid |= o.image.feedback.word(&image::WINDING) & 0b11;
+        });
+        slid
+    };
+    assert_eq!(slides(0), 0);
+    assert_ne!(slides(command_2::RIDER_UP), 0);
+}
+
+/// With its loop open the unwind pulls what the reference says and the load cells are not looked at: the tension is
+/// off by what the feed-forward does not know, and comes back when the loop closes, both without a bump.
+#[test]
+fn the_tension_loop_opens_and_closes() {
+    let mut o = running_at(600.0);
+    assert!(o.is(status::TENSION_CONTROL));
+    let reference = o.value(&image::TENSION_REF);
+    near("closed", o.value(&image::TENSION), reference, 1.0);
+    // load cells that show too little are followed by the closed loop …
+    o.set(&image::FAULT_WRAP_ANGLE, -10.0);
+    o.wait(20.0);
+    let followed = o.t()[1];
+    assert!(followed > 1.02 * TENSION, "{followed} N");
+    // … and not by the open one
+    put(
+        &mut o,
+        &image::WINDER_COMMAND_2,
+        command_2::TENSION_CONTROL_OFF,
+    );
+    let mut last = o.t()[1];
+    o.wait_with(20.0, |o| {
+        let now = o.t()[1];
+        assert!((now - last).abs() < 10.0, "a bump from {last} to {now} N");
+        last = now;
+    });
+    assert!(!o.is(status::TENSION_CONTROL) && o.is(status::TENSION_DETECTED));
+    // the description of the drives is the plant's: the feed-forward alone is nearly right
+    near("open", o.t()[1], TENSION, 0.01 * TENSION);
+    put(&mut o, &image::WINDER_COMMAND_2, 0);
+    o.wait_with(20.0, |o| {
+        let now = o.t()[1];
+        assert!((now - last).abs() < 10.0, "a bump from {last} to {now} N");
+        last = now;
+    });
+    near("closed again", o.t()[1], followed, 0.005 * TENSION);
+    assert_eq!((o.mode(), o.fault()), (Mode::Run, Fault::None));
+}
+
+/// Auto-tune of the tension needs its loop.
+#[test]
+fn the_tension_is_not_tuned_with_its_loop_open() {
+    let mut o = in_mode(Mode::Thread);
+    put(
+        &mut o,
+        &image::WINDER_COMMAND_2,
+        command_2::TENSION_CONTROL_OFF,
+    );
+    put(&mut o, &image::AUTOTUNE_LOOP, 2);
+    o.wait(1.0);
+    o.command(command::AUTOTUNE);
+    o.until(10.0, |o| o.value(&image::AUTOTUNE_ABORT) != 0.0);
+    let code = o.value(&image::AUTOTUNE_ABORT) as u8;
+    assert_eq!(code, TuneAbort::WrongControl.number());
 }

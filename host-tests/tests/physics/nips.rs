@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use model_core::exchange::{Actuators, Brakes, BySection};
+use model_core::exchange::{Actuators, Brakes, BySection, Rider};
 use model_core::machine::Machine;
 use model_core::plant::nip::Nips;
 use model_core::real::Float;
@@ -18,6 +18,9 @@ in_both_scalars!(
     a_roll_that_sticks_again_keeps_the_momentum,
     static_traction_is_lost_at_once,
     tight_layers_are_thinner,
+    a_lifted_rider_roll_coasts,
+    a_lowered_rider_roll_is_caught,
+    drums_without_friction_turn_alone,
 );
 
 fn slipping() -> Machine {
@@ -89,6 +92,112 @@ fn the_rider_roll_holds_the_nip_load() {
     );
     near("below", nips.loads(0.049)[2], 2.53e3, 1e-9);
     near("above", nips.loads(0.6)[2], 0.40e3, 1e-9);
+}
+
+/// Q is the table's times what is set, and 0 of a lifted roll; the drums' nips follow by N = (w + Q)/(2·cos α).
+#[test]
+fn the_load_of_the_rider_roll_is_set() {
+    let m = Machine::news_8000();
+    let mut nips = Nips::<f64>::new(&m);
+    let r = 0.2;
+    let table = nips.loads(r)[2];
+    for (lifted, load_trim, share, changed) in [
+        (false, 0.0, 1.0, false),
+        (false, -0.4, 0.6, true),
+        (false, 1.0, 2.0, true),
+        (false, -1.5, 0.0, true),
+        (true, 0.5, 0.0, true),
+    ] {
+        assert_eq!(nips.press(&Rider { lifted, load_trim }), changed);
+        let [rear, front, rider] = nips.loads(r);
+        near("Q", rider, share * table, 1e-9 * table);
+        near("N", rear, load(&m, r, share * table), 1e-9 * rear);
+        assert_eq!(rear, front);
+        assert_eq!(nips.rider_lifted(), lifted);
+    }
+}
+
+fn with_rider<R: Float>(lifted: bool) -> Actuators<R> {
+    Actuators {
+        rider: Rider {
+            lifted,
+            ..Rider::default()
+        },
+        ..Actuators::default()
+    }
+}
+
+/// V_rr = V_0·exp(−c·t/m), and what is left of the windup slows down by its own friction: M'·V̇ = −Σ c·V. On a
+/// machine that does not compute slip otherwise.
+fn a_lifted_rider_roll_coasts<R: Float>() {
+    let mut m = Machine::news_8000();
+    // resistance and growth of the shipping roll have tests of their own
+    m.shipping_roll.friction_n_s_m = 0.0;
+    let (v, r, steps) = (20.0, 0.3, 2500);
+    let mut bench = turning::<R>(m.clone(), v, r);
+    for _ in 0..steps {
+        let measured = bench.winder.step(&with_rider(true));
+        assert!(measured.rider_lifted);
+    }
+    let time = f64::from(steps) * H;
+    let x = bench.x();
+    let [fd, rr, wu] = x.windup;
+    let rider = m.rider_roll;
+    let coasted = v * (-rider.friction_n_s_m * time / rider.mass_kg()).exp();
+    near("V_rr", rr, coasted, either::<R>(1e-4, 1e-9));
+    let mass = form::windup_mass(&m, r) - rider.mass_kg();
+    let friction = m.rear_drum.friction_n_s_m + m.front_drum.friction_n_s_m;
+    let slowed = v * (-friction * time / mass).exp();
+    near("V_rd", x.v[2], slowed, either::<R>(1e-4, 1e-9));
+    assert_eq!([fd, wu], [x.v[2]; 2], "the others stick");
+    assert!((rr - x.v[2]).abs() > 0.1, "{rr} is not {}", x.v[2]);
+}
+
+/// Lowered onto a turning roll the standing rider roll is pulled up by μ·Q·W, and sticks with the momentum kept.
+fn a_lowered_rider_roll_is_caught<R: Float>() {
+    let m = bare();
+    let (v, r) = (20.0, 0.3);
+    let mut bench = turning::<R>(m.clone(), v, r);
+    let mut x = bench.x();
+    x.windup[1] = 0.0;
+    bench.set(&x);
+    for _ in 0..100 {
+        bench.winder.step(&with_rider(true));
+    }
+    assert_eq!(bench.x().windup[1], 0.0, "nothing pulls it");
+    let rider = m.rider_roll.mass_kg();
+    let rest = form::windup_mass(&m, r) - rider;
+    let pull = m.nips.friction * m.web.width_m * Nips::<f64>::new(&m).loads(r)[2];
+    // both ends of the slip come nearer by the pull on their reduced mass
+    let slips = v / (pull * (1.0 / rider + 1.0 / rest));
+    let mut steps = 0;
+    while bench.winder.winding().slides[2] {
+        bench.winder.step(&with_rider(false));
+        steps += 1;
+        assert!(steps < 1000);
+    }
+    near("slip ends after", f64::from(steps) * H, slips, 2.0 * H);
+    let common = v * rest / (rest + rider);
+    let x = bench.x();
+    near("V", x.v[2], common, either::<R>(1e-4, 1e-9));
+    assert_eq!(x.windup, [x.v[2]; 3]);
+}
+
+/// Drums that have lost all their friction keep their speeds while a brake stops one of them: nothing passes.
+fn drums_without_friction_turn_alone<R: Float>() {
+    let mut bench = turning::<R>(bare(), 10.0, 0.3);
+    let mut actuators = Actuators::<R>::default();
+    actuators.faults.machine.drum_wear = R::of(1.0);
+    actuators.brakes.rd = true;
+    for _ in 0..2000 {
+        bench.winder.step(&actuators);
+    }
+    let x = bench.x();
+    let [fd, rr, wu] = x.windup;
+    assert_eq!(x.v[2], 0.0);
+    near("V_fd", fd, 10.0, either::<R>(1e-4, 1e-9));
+    near("V_wu", wu, 10.0, either::<R>(1e-4, 1e-9));
+    near("V_rr", rr, 10.0, either::<R>(1e-4, 1e-9));
 }
 
 /// All nips sticking is {15}: the same bits as the windup that cannot slip.

@@ -6,8 +6,8 @@ use super::motor::Motor;
 use super::pi::Pi;
 use super::table::Table;
 use super::tuning::DrumTuning;
-use crate::exchange::{BySection, Measurements};
-use crate::machine::{MAX_FRONT_SHARES, Machine};
+use crate::exchange::{BySection, Measurements, Rider};
+use crate::machine::{MAX_FRONT_SHARES, MAX_RIDER_LOADS, Machine};
 use crate::real::Real;
 
 /// Lag with which the drums take over the tension that the unwind holds, s.
@@ -41,6 +41,8 @@ struct Coefficients<R> {
     front_share: Table<R, MAX_FRONT_SHARES>,
     /// Rider roll's share of the winding force.
     rider_share: R,
+    /// Rider roll's load per width over the diameter, N/m.
+    rider_load: Table<R, MAX_RIDER_LOADS>,
     /// Share of a change of tension that a period makes up for.
     tension_share: R,
 }
@@ -60,6 +62,8 @@ pub struct DrumTask<R> {
     pub probe: R,
     /// Added to the front drum's share.
     pub share_trim: R,
+    /// The rider roll is lifted and coasts.
+    pub rider_lifted: bool,
 }
 
 impl<R: Real> Drums<R> {
@@ -74,6 +78,8 @@ impl<R: Real> Drums<R> {
         let path = &machine.idle[machine.load_cells.roll + 1..];
         let shares = machine.operation.front_share.iter();
         let shares = shares.map(|point| (point.diameter_m, point.share));
+        let loads = machine.nips.rider_load.iter();
+        let loads = loads.map(|point| (point.diameter_m, point.load_n_m));
         let r = R::of;
         Self {
             c: Coefficients {
@@ -88,6 +94,7 @@ impl<R: Real> Drums<R> {
                 rider_friction: r(rr.friction_n_s_m),
                 front_share: Table::new(shares),
                 rider_share: r(machine.operation.rider_share),
+                rider_load: Table::new(loads),
                 tension_share: r(-libm::expm1(-period / TENSION_LAG_S)),
             },
             tuning: *tuning,
@@ -120,6 +127,15 @@ impl<R: Real> Drums<R> {
     /// Radius of the rear drum, m.
     pub fn radius(&self) -> R {
         self.c.r_rd
+    }
+
+    /// Load of the rider roll per width as it is set, N/m.
+    pub fn rider_load(&self, rider: &Rider<R>, m: &Measurements<R>) -> R {
+        if rider.lifted {
+            R::ZERO
+        } else {
+            (R::ONE + rider.load_trim) * self.c.rider_load.at(m.d_wu)
+        }
     }
 
     /// Largest force of both drums with the same torque for each metre of radius, N.
@@ -158,7 +174,7 @@ impl<R: Real> Drums<R> {
     ///
     /// F = M̂·a* + ĉ·v* + t + path + PI(v* − v), with the tension t and what the idle rolls after the load
     /// cells take. The rider roll turns itself and gives its share of what is compensated; of the rest, which the
-    /// regulator trims, the front drum takes its share.
+    /// regulator trims, the front drum takes its share. A lifted rider roll neither takes nor gives.
     pub fn step(&mut self, task: &DrumTask<R>, m: &Measurements<R>) -> BySection<R> {
         let c = &self.c;
         match task.tension {
@@ -176,7 +192,11 @@ impl<R: Real> Drums<R> {
             + task.probe
             + path;
         let own = c.rider_mass * task.a_ref + c.rider_friction * task.v_ref;
-        let rider_force = own + c.rider_share * (feed_forward - own);
+        let (feed_forward, rider_force) = if task.rider_lifted {
+            (feed_forward - own, R::ZERO)
+        } else {
+            (feed_forward, own + c.rider_share * (feed_forward - own))
+        };
         let rider = (rider_force * c.r_rr).limit(c.motors.rr.limit(m.omega.rr, task.limit.rr));
 
         let share = (c.front_share.at(m.d_wu) + task.share_trim).clamp(R::ZERO, R::ONE);

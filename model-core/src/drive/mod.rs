@@ -14,8 +14,8 @@ pub mod tuning;
 pub mod unwind;
 
 use crate::exchange::{
-    Actuators, Brakes, BySection, DriveCommand, DriveStatus, Loop, Measurements, Setting, TuneStep,
-    UnwindControl,
+    Actuators, Brakes, BySection, DriveCommand, DriveStatus, Loop, Measurements, Rider, Setting,
+    TuneStep, UnwindControl,
 };
 use crate::machine::Machine;
 use crate::real::Real;
@@ -143,10 +143,11 @@ impl<R: Real> Drive<R> {
                 uw: command.brakes.uw || assist,
                 ..command.brakes
             },
+            rider: command.rider,
             handling: command.handling,
             faults: command.faults,
         };
-        let status = self.status(m, v, torque);
+        let status = self.status(m, v, torque, &command.rider);
         self.last_tension = m.tension;
         (actuators, status)
     }
@@ -157,7 +158,7 @@ impl<R: Real> Drive<R> {
         let alone = command.unwind == UnwindControl::Speed;
         if !(command.drums || alone) || tuned == Some(Loop::DrumSpeed) {
             self.speed.set(v);
-        } else if !command.freeze_ramp {
+        } else {
             self.speed
                 .step(command.v_target, command.acceleration, command.jerk);
         }
@@ -221,6 +222,7 @@ impl<R: Real> Drive<R> {
                 v,
                 r: self.diameter.radius(),
                 limit: limit.uw,
+                open: command.tension_open,
                 probe,
             };
             self.unwind.step(&task, m)
@@ -236,6 +238,7 @@ impl<R: Real> Drive<R> {
                 tension: (command.unwind == UnwindControl::Tension).then(|| self.tension.value()),
                 probe: probe.unwrap_or_default(),
                 share_trim: command.front_share_trim,
+                rider_lifted: command.rider.lifted,
             };
             self.drums.step(&task, m)
         } else {
@@ -305,7 +308,9 @@ impl<R: Real> Drive<R> {
             tension_ref: self.tension.value(),
             v,
             steady: self.speed.rate() == R::ZERO && self.tension.rate() == R::ZERO,
-            controlled: command.unwind == UnwindControl::Tension && command.drums,
+            controlled: command.unwind == UnwindControl::Tension
+                && command.drums
+                && !command.tension_open,
             stiffness: tuning.web_stiffness,
             mass: tuning.inertia(r) / (r * r),
             drum_mass: self.drums.tuning().mass(m.d_wu),
@@ -368,7 +373,13 @@ impl<R: Real> Drive<R> {
         gains.setting(self.period)
     }
 
-    fn status(&self, m: &Measurements<R>, v: R, torque: BySection<R>) -> DriveStatus<R> {
+    fn status(
+        &self,
+        m: &Measurements<R>,
+        v: R,
+        torque: BySection<R>,
+        rider: &Rider<R>,
+    ) -> DriveStatus<R> {
         let r_uw = self.diameter.radius();
         DriveStatus {
             v,
@@ -381,6 +392,7 @@ impl<R: Real> Drive<R> {
             torque,
             load: torque.zip(self.motors).map(|(t, motor)| motor.load(t)),
             power: torque.zip(m.omega).map(|(t, omega)| t * omega),
+            rider_load: self.drums.rider_load(rider, m),
             overloaded: self.overload.map(|overload| overload.is_exhausted()),
             autotune: *self.tuner.report(),
         }

@@ -11,6 +11,8 @@ use crate::real::Real;
 
 /// Limit of the tension loop's trim, of rated torque.
 const TRIM_LIMIT: f64 = 0.20;
+/// Where the tension loop is opened, its whole trim is given back in this time, s.
+const RELEASE_S: f64 = 2.0;
 /// Corner of the high-pass that keeps a wrong diameter out of the damping, rad/s.
 const WASHOUT: f64 = 1.0;
 /// The slack take-up turns slower than the web by at least this, m/s …
@@ -50,6 +52,8 @@ struct Coefficients<R> {
     path_mass: R,
     path_friction: R,
     trim_limit: R,
+    /// Share of the limit that a period gives back.
+    release: R,
     per_max_speed: R,
     washout: R,
     draw_rate: R,
@@ -112,6 +116,8 @@ pub struct UnwindTask<R> {
     pub r: R,
     /// Limit of torque, of rated torque.
     pub limit: R,
+    /// The tension loop is open: nothing is trimmed.
+    pub open: bool,
     /// The tension loop is open and undamped, and pulls so much more, N: auto-tune looks how the web swings.
     pub probe: Option<R>,
 }
@@ -133,6 +139,7 @@ impl<R: Real> Unwind<R> {
                 path_mass: of(path.iter().map(|roll| roll.mass_kg()).sum()),
                 path_friction: of(path.iter().map(|roll| roll.friction_n_s_m).sum()),
                 trim_limit: of(TRIM_LIMIT * machine.motors.uw.torque_n_m),
+                release: of(period / RELEASE_S),
                 per_max_speed: of(1.0 / machine.operation.max_speed_m_s),
                 washout: of(WASHOUT * period),
                 draw_rate: of(DRAW_RATE * period),
@@ -212,7 +219,7 @@ impl<R: Real> Unwind<R> {
     ///
     /// `path` is what the idle rolls before the load cells take: their inertia and friction are compensated as
     /// the roll's own. The damping acts on the fast part of the unwind's speed error and fades as the web's own
-    /// transport takes over.
+    /// transport takes over. Where the tension loop is open, the trim goes to zero and stays there.
     fn hold_tension(&mut self, task: &UnwindTask<R>, m: &Measurements<R>, roll: &Roll<R>) -> R {
         let (c, k) = (&self.c, &self.known);
         let path = c.path_mass * task.a_ref + c.path_friction * task.v_ref;
@@ -225,16 +232,19 @@ impl<R: Real> Unwind<R> {
         if roll.entered {
             // bumpless: the trim takes up where the torque stands. The damping is left out, for what swings now does
             // not stay
-            let trim = open_loop - self.torque * k.per_r;
-            self.tension
-                .start_at(&k.tension_gains, error, trim.limit(bound));
+            self.trim = (open_loop - self.torque * k.per_r).limit(bound);
+            self.tension.start_at(&k.tension_gains, error, self.trim);
         }
         if let Some(probe) = task.probe {
             return open_loop - self.trim - probe;
         }
-        self.trim = self
-            .tension
-            .step(&k.tension_gains, error, R::ZERO, -bound, bound);
+        if task.open {
+            self.trim -= self.trim.limit(c.release * bound);
+            self.tension.start_at(&k.tension_gains, error, self.trim);
+        } else {
+            let gains = &k.tension_gains;
+            self.trim = self.tension.step(gains, error, R::ZERO, -bound, bound);
+        }
         open_loop - self.trim - damping
     }
 

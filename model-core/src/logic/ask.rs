@@ -2,12 +2,12 @@
 //!
 //! Not here: which mode it is.
 
-use super::{Logic, Mode, Sight, inject};
+use super::{Logic, Mode, Sight, command_2, inject};
 use crate::exchange::{
-    Brakes, BySection, DriveCommand, Faults, Loop, MachineFaults, SensorFaults, Stuck,
+    Brakes, BySection, DriveCommand, Faults, Loop, MachineFaults, Rider, SensorFaults, Stuck,
     UnwindControl,
 };
-use crate::image;
+use crate::image::{self, Commands};
 use crate::profidrive::stw1;
 use crate::real::Real;
 
@@ -42,8 +42,8 @@ impl<R: Real> Logic<R> {
             v_target: row.v,
             acceleration: row.limits.0,
             jerk: row.limits.1,
-            freeze_ramp: false,
             tension: row.tension,
+            tension_open: tension_open(commands),
             preset: self.one_shot.preset,
             freeze_diameter: matches!(self.mode, Mode::WebBreakStop | Mode::UnwindManeuver),
             brake_assist: self.mode == Mode::EmergencyStop && !tripped.uw,
@@ -60,6 +60,7 @@ impl<R: Real> Logic<R> {
                 _ => get(&image::FRONT_SHARE_TRIM) * percent,
             },
             brakes: row.brakes,
+            rider: rider(commands),
             handling: self.one_shot.handling,
             faults: self.inject(sight),
             autotune: (self.mode == Mode::AutoTune).then_some(self.tuned),
@@ -184,4 +185,22 @@ impl<R: Real> Logic<R> {
             },
         }
     }
+}
+
+/// The rider roll as it is commanded. A load of 0 % is none that was set: the table's counts.
+fn rider<R: Real>(commands: &Commands) -> Rider<R> {
+    let load: R = commands.get(&image::RIDER_LOAD_SET);
+    Rider {
+        lifted: commands.word(&image::WINDER_COMMAND_2) & command_2::RIDER_UP != 0,
+        load_trim: if load == R::ZERO {
+            R::ZERO
+        } else {
+            load * R::of(0.01) - R::ONE
+        },
+    }
+}
+
+/// The PLC wants the tension loop open.
+pub(super) fn tension_open(commands: &Commands) -> bool {
+    commands.word(&image::WINDER_COMMAND_2) & command_2::TENSION_CONTROL_OFF != 0
 }

@@ -3,7 +3,7 @@
 //! Not here: protocols. The simulator's own words do not travel by the bus of a winder and are neither late nor lost.
 
 use crate::image::{
-    BUS_DELAY, Commands, Direction, FAULT_DRIVES, FEEDBACK_WORDS, Feedback, PLC_COMMAND_WORDS,
+    BUS_DELAY, Block, COMMAND_WORDS, Commands, Direction, FAULT_DRIVES, FEEDBACK_WORDS, Feedback,
     SIGNALS, Section,
 };
 use crate::logic::inject;
@@ -11,12 +11,17 @@ use crate::logic::inject;
 /// Longest delay, drive cycles.
 pub const MAX_DELAY: usize = 10;
 
-/// Which words of the feedback are the simulator's own.
-const OWN: [bool; FEEDBACK_WORDS] = {
-    let (mut own, mut i) = ([false; FEEDBACK_WORDS], 0);
+/// Which words of the commands are the simulator's own.
+const OWN_COMMANDS: [bool; COMMAND_WORDS] = own(Direction::Command);
+/// Which words of the feedback are.
+const OWN_FEEDBACK: [bool; FEEDBACK_WORDS] = own(Direction::Feedback);
+
+const fn own<const N: usize>(direction: Direction) -> [bool; N] {
+    let (mut own, mut i) = ([false; N], 0);
     while i < SIGNALS.len() {
         let s = &SIGNALS[i];
-        if matches!(s.direction, Direction::Feedback) && matches!(s.section, Section::Simulator) {
+        let same = s.direction as u8 == direction as u8;
+        if same && matches!(s.section, Section::Simulator) {
             let mut word = s.word;
             while word < s.word + s.kind.words() {
                 own[word as usize] = true;
@@ -26,12 +31,12 @@ const OWN: [bool; FEEDBACK_WORDS] = {
         i += 1;
     }
     own
-};
+}
 
 /// The last cycles of both directions.
 #[derive(Clone, Debug)]
 pub struct Bus {
-    commands: [[u16; PLC_COMMAND_WORDS]; MAX_DELAY],
+    commands: [Commands; MAX_DELAY],
     feedback: [Feedback; MAX_DELAY],
     now: usize,
     /// Cycles that are on record, up to the longest delay.
@@ -44,7 +49,7 @@ pub struct Bus {
 impl Default for Bus {
     fn default() -> Self {
         Self {
-            commands: [[0; PLC_COMMAND_WORDS]; MAX_DELAY],
+            commands: [Commands::default(); MAX_DELAY],
             feedback: [Feedback::default(); MAX_DELAY],
             now: 0,
             known: 0,
@@ -61,17 +66,16 @@ impl Bus {
         let delay: f32 = commands.get(&BUS_DELAY);
         self.silent = commands.word(&FAULT_DRIVES) & inject::BUS_SILENT != 0;
         let (before, now) = (self.now, (self.now + 1) % MAX_DELAY);
-        let (plc, _) = commands.words.split_at(PLC_COMMAND_WORDS);
-        if !self.silent || self.known == 0 {
-            self.commands[now].copy_from_slice(plc);
+        self.commands[now] = if self.silent && self.known > 0 {
+            self.commands[before]
         } else {
-            self.commands[now] = self.commands[before];
-        }
+            *commands
+        };
         self.now = now;
         self.known = (self.known + 1).min(MAX_DELAY);
         self.late = (delay as usize).saturating_sub(1).min(self.known - 1);
         let mut seen = *commands;
-        seen.words[..PLC_COMMAND_WORDS].copy_from_slice(&self.commands[self.past()]);
+        overlay(&mut seen, &self.commands[self.past()], &OWN_COMMANDS);
         seen
     }
 
@@ -82,15 +86,19 @@ impl Bus {
         } else {
             *answer
         };
-        let past = &self.feedback[self.past()];
-        for ((word, own), old) in seen.words.iter_mut().zip(OWN).zip(past.words) {
-            if !own {
-                *word = old;
-            }
-        }
+        overlay(seen, &self.feedback[self.past()], &OWN_FEEDBACK);
     }
 
     fn past(&self) -> usize {
         (self.now + MAX_DELAY - self.late) % MAX_DELAY
+    }
+}
+
+/// Puts what travels by the bus over a block, and leaves it what is the simulator's own.
+fn overlay<const N: usize>(block: &mut Block<N>, travelled: &Block<N>, own: &[bool; N]) {
+    for ((word, own), travelled) in block.words.iter_mut().zip(own).zip(travelled.words) {
+        if !own {
+            *word = travelled;
+        }
     }
 }

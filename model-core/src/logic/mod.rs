@@ -28,8 +28,9 @@ mod words;
 
 pub use section::{Demand, Section, State};
 pub use words::{
-    COMMAND_BITS, DRIVE_FAULT_BITS, Fault, LOOPS, MACHINE_FAULT_BITS, Mode, Refusal,
-    SENSOR_FAULT_BITS, STATUS_BITS, WARNING_BITS, WINDING_BITS, command, inject, status, warning,
+    COMMAND_2_BITS, COMMAND_BITS, DRIVE_FAULT_BITS, Fault, LOOPS, MACHINE_FAULT_BITS, Mode,
+    Refusal, SENSOR_FAULT_BITS, STATUS_BITS, WARNING_BITS, WINDING_BITS, command, command_2,
+    inject, status, warning,
 };
 
 use crate::exchange::{

@@ -2,7 +2,7 @@
 //!
 //! Not here: the tasks' times; whoever runs the tasks knows them.
 
-use super::{Fault, Logic, Mode, Refusal, Sight, status};
+use super::{Fault, Logic, Mode, Refusal, Sight, ask, status};
 use crate::image::{self, Feedback};
 use crate::profidrive::zsw1;
 use crate::real::Real;
@@ -62,6 +62,7 @@ impl<R: Real> Logic<R> {
         f.set(&image::POWER_RR, power.rr);
         f.set(&image::D_UW, d.r_uw * R::of(2e3));
         f.set(&image::D_WU, m.d_wu * R::of(1e3));
+        f.set(&image::RIDER_LOAD, d.rider_load);
         let pulses = m.pulses_rd.wrapping_sub(self.pulses_at_core);
         f.set(&image::LENGTH_WU, f64::from(pulses) * c.metres_per_pulse);
         f.set_double(&image::PULSES_RD, m.pulses_rd);
@@ -81,6 +82,7 @@ impl<R: Real> Logic<R> {
 
     fn status(&self, sight: &Sight<R>, at_speed: bool) -> u16 {
         let (closed, latched) = (sight.m.brakes, self.faults.latched());
+        let closed_loop = self.holds_tension() && !ask::tension_open(sight.commands);
         [
             (self.all_in_operation(), status::DRIVES_ON),
             (self.tension.is_on(), status::TENSION_DETECTED),
@@ -94,6 +96,8 @@ impl<R: Real> Logic<R> {
             (self.preset_taken, status::PRESET_TAKEN),
             (!latched.is_empty(), status::FAULT),
             (self.refusal != Refusal::None, status::REFUSED),
+            (!sight.m.rider_lifted, status::RIDER_DOWN),
+            (closed_loop, status::TENSION_CONTROL),
         ]
         .into_iter()
         .filter_map(|(on, bit)| on.then_some(bit))

@@ -36,6 +36,14 @@ pub mod command {
     pub const WEB_REMOVED: u16 = 1 << 14;
 }
 
+/// Bits of the winder's second command word.
+pub mod command_2 {
+    /// The rider roll is lifted off the shipping roll, as long as it stands.
+    pub const RIDER_UP: u16 = 1 << 0;
+    /// The tension loop is open, as long as it stands.
+    pub const TENSION_CONTROL_OFF: u16 = 1 << 1;
+}
+
 /// Bits of the winder's status word.
 pub mod status {
     /// All drives follow their set-points.
@@ -62,6 +70,10 @@ pub mod status {
     pub const FAULT: u16 = 1 << 10;
     /// The last command was refused.
     pub const REFUSED: u16 = 1 << 11;
+    /// The rider roll lies on the shipping roll.
+    pub const RIDER_DOWN: u16 = 1 << 12;
+    /// The tension loop is closed.
+    pub const TENSION_CONTROL: u16 = 1 << 13;
 }
 
 /// The bits of the command word by name.
@@ -127,6 +139,20 @@ pub const COMMAND_BITS: &[Bit] = &[
     ),
 ];
 
+/// The bits of the second command word by name.
+pub const COMMAND_2_BITS: &[Bit] = &[
+    Bit::new(
+        0,
+        "rider_up",
+        "lifts the rider roll off the shipping roll; its drive coasts",
+    ),
+    Bit::new(
+        1,
+        "tension_control_off",
+        "opens the tension loop: the unwind pulls what the reference says",
+    ),
+];
+
 /// The bits of the status word by name.
 pub const STATUS_BITS: &[Bit] = &[
     Bit::new(0, "drives_on", "all drives follow their set-points"),
@@ -145,6 +171,12 @@ pub const STATUS_BITS: &[Bit] = &[
     Bit::new(9, "preset_taken", "a diameter preset has been taken over"),
     Bit::new(10, "fault", "a fault is latched"),
     Bit::new(11, "refused", "the last command was refused"),
+    Bit::new(12, "rider_down", "the rider roll lies on the shipping roll"),
+    Bit::new(
+        13,
+        "tension_control",
+        "the unwind holds the tension by its closed loop",
+    ),
 ];
 
 /// Writes an enum of codes with their texts from one table.

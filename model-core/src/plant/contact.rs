@@ -348,7 +348,9 @@ impl<R: Real> Contact<R> {
                 continue;
             };
             let slip = v.rolls[j] - v.wu;
-            if slip * force > R::ZERO && !holding.meets[j] {
+            // what nothing pulls slips on for ever
+            let turned = slip * force < R::ZERO || slip == R::ZERO;
+            if !turned && !holding.meets[j] {
                 continue;
             }
             let stuck = (0..ROLLS).filter(|i| nips[*i] == Nip::Sticks);

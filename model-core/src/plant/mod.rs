@@ -325,7 +325,19 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             self.state.v[..SPANS - 1].fill(R::Sum::at(R::ZERO));
             self.thread_with(strain);
         }
+        // the rider roll has been lifted, or is loaded as the machine's table does not say
+        if self.holders.nips.press(&actuators.rider) {
+            self.let_slip();
+        }
         self.suffer(&actuators.faults.machine);
+    }
+
+    /// The windup may slip from now on; a nip that sticks computes what a whole windup does.
+    fn let_slip(&mut self) {
+        if !self.holders.slips {
+            self.holders.slips = true;
+            self.apart = [self.state.v[SPANS - 1]; ROLLS];
+        }
     }
 
     /// The faults that a test puts into the machine.
@@ -338,10 +350,8 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         {
             self.break_web_in(span.into());
         }
-        // drums once worn may slip from then on; a nip that sticks computes what a whole windup does
-        if self.holders.nips.wear(faults.drum_wear) && !self.holders.slips {
-            self.holders.slips = true;
-            self.apart = [self.state.v[SPANS - 1]; ROLLS];
+        if self.holders.nips.wear(faults.drum_wear) {
+            self.let_slip();
         }
         self.eccentricity.add_to_parent_roll(faults.eccentricity);
     }
@@ -596,6 +606,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             omega: BySection { uw, rd, fd, rr },
             travel: x.travel.value().to_si(scale.travel),
             r_wu: x.r_wu.value().to_si(scale.r_wu),
+            rider_lifted: self.holders.nips.rider_lifted(),
         };
         let t = self
             .sensors

@@ -5,6 +5,7 @@
 use heapless::Vec;
 
 use super::windup::ROLLS;
+use crate::exchange::Rider;
 use crate::machine::{MAX_RIDER_LOADS, Machine};
 use crate::real::Real;
 
@@ -28,6 +29,10 @@ pub struct Nips<R> {
     /// Square of the core's radius, m²: the core weighs nothing.
     core: R,
     rider: RiderLoad<R>,
+    /// Share of its load that the rider roll has; 0 while it is lifted.
+    pressed: R,
+    /// As it was commanded last.
+    pressing: Rider<R>,
     wound_on: WoundOn<R>,
 }
 
@@ -68,6 +73,11 @@ impl<R: Real> Nips<R> {
             weight: R::of(weight),
             core: R::of(core * core),
             rider: RiderLoad::new(machine),
+            pressed: R::ONE,
+            pressing: Rider {
+                lifted: false,
+                load_trim: R::ZERO,
+            },
             wound_on: WoundOn {
                 compresses: wound.compresses,
                 per_width: R::of(1.0 / machine.web.width_m),
@@ -92,7 +102,7 @@ impl<R: Real> Nips<R> {
     ///
     /// w = π·ρ·g·(R_wu² − R_core²) is the weight of the roll, Q the rider roll's load, both per width.
     pub fn loads(&self, r_wu: R) -> [R; ROLLS] {
-        let rider = self.rider.at(r_wu);
+        let rider = self.pressed * self.rider.at(r_wu);
         let weight = self.weight * (r_wu * r_wu - self.core);
         let half = R::of(0.5) * (weight + rider);
         let drum = |i: usize| {
@@ -100,6 +110,25 @@ impl<R: Real> Nips<R> {
             half / (R::ONE - sine * sine).sqrt()
         };
         [drum(0), drum(1), rider]
+    }
+
+    /// Lifts the rider roll, or presses it on with another load than its table's; tells whether it does so now.
+    pub fn press(&mut self, rider: &Rider<R>) -> bool {
+        if *rider == self.pressing {
+            return false;
+        }
+        self.pressing = *rider;
+        self.pressed = if rider.lifted {
+            R::ZERO
+        } else {
+            (R::ONE + rider.load_trim).max(R::ZERO)
+        };
+        rider.lifted || rider.load_trim != R::ZERO
+    }
+
+    /// The rider roll is off the shipping roll.
+    pub fn rider_lifted(&self) -> bool {
+        self.pressing.lifted
     }
 
     /// Drums that have lost a share of their friction; tells whether they lose it now.

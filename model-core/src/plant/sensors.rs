@@ -38,6 +38,8 @@ pub struct Sensors<R> {
     count: u32,
     /// Way since the last pulse, in pulses.
     fraction: R,
+    /// Diameter under the rider roll when it lay on the shipping roll last, m.
+    d_wu: R,
 }
 
 /// sin(β/2)/(2·sin(β_cal/2)): what the load cells show of the sum of both tensions.
@@ -53,6 +55,8 @@ pub struct Sight<R> {
     pub travel: R,
     /// Radius of the shipping roll, m.
     pub r_wu: R,
+    /// The rider roll is off it.
+    pub rider_lifted: bool,
 }
 
 impl<R: Real> Sensors<R> {
@@ -78,6 +82,7 @@ impl<R: Real> Sensors<R> {
             wandered: R::ZERO,
             count: 0,
             fraction: R::ZERO,
+            d_wu: R::of(2.0 * machine.shipping_roll.core_radius_m),
         }
     }
 
@@ -108,12 +113,16 @@ impl<R: Real> Sensors<R> {
         if !faults.encoder_rd {
             self.count_pulses(sight.travel);
         }
+        if !sight.rider_lifted {
+            self.d_wu = sight.r_wu + sight.r_wu;
+        }
         Measurements {
             omega,
             tension: self.tension,
-            d_wu: sight.r_wu + sight.r_wu,
+            d_wu: self.d_wu,
             pulses_rd: self.count,
             brakes: Default::default(),
+            rider_lifted: sight.rider_lifted,
         }
     }
 
