@@ -91,7 +91,7 @@ fn the_tail_is_wound_up<R: Float>() {
         m.parent_roll.expire_radius_m,
         0.3,
     );
-    let mut bench = Bench::threaded(m.clone(), &x);
+    let mut bench: Bench<R> = Bench::threaded(m.clone(), &x);
     // the roll has run out in the first span
     bench.step(&Default::default());
     let before = bench.x();

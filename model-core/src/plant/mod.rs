@@ -205,11 +205,12 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             fd: stuck.fd.acts_on(self.delay.fd.step(brakes.fd)),
         };
         self.state.travel = R::Sum::at(R::ZERO);
+        let trails = self.tail > R::Si::ZERO;
         for _ in 0..self.substeps {
             self.advance(actuators);
             self.break_web_if_due();
         }
-        if self.tail > R::Si::ZERO {
+        if trails {
             self.tail -= self.state.travel.value().to_si(self.scale.travel);
         }
         self.measure(&actuators.faults.sensors)
