@@ -9,10 +9,9 @@ use std::fs;
 
 use host_tests::batch::group::{Extremes, Progress, Run, side_by_side};
 use host_tests::batch::lanes::{LANES, Lanes};
-use host_tests::batch::rates;
 use host_tests::plant::{self, Options, Scalar, Schedule};
 use model_core::exchange::{Actuators, Brakes, BySection};
-use model_core::machine::{Machine, PRESETS};
+use model_core::machine::Machine;
 use model_core::plant::Winder;
 use model_core::real::Arithmetic;
 use proptest::prelude::*;
@@ -395,19 +394,4 @@ fn a_sweep_that_is_refused_leaves_no_file() {
         "{error}"
     );
     assert!(!path("out.csv").exists());
-}
-
-/// `cargo test --release -p host-tests --test batch -- --ignored --nocapture`
-#[test]
-#[ignore = "a measurement, not a check"]
-fn rates_of_the_presets() {
-    for (name, preset) in PRESETS {
-        let rates = rates(&preset(), 20).unwrap();
-        println!(
-            "{name:<20}{:6.1} million steps/s alone, {:6.1} million side by side: {:.1} times",
-            1e-6 * rates.alone,
-            1e-6 * rates.side_by_side,
-            rates.ratio()
-        );
-    }
 }

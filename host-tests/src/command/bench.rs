@@ -16,6 +16,7 @@ use model_core::real;
 use model_core::simulator::Simulator;
 use model_core::twin::{self, Course, Extent};
 
+use crate::batch;
 use crate::flops::{self, Floor};
 use crate::interrupt;
 use crate::setup::{self, Warnings};
@@ -130,6 +131,23 @@ pub fn main(args: &Args) -> Result<ExitCode> {
             let [plant, simulator] = (scalar.speeds)(machine)?;
             println!("| {name} | {} | {plant:.0} | {simulator:.0} |", scalar.name);
         }
+    }
+    println!(
+        "\n# Many winders at once\n\n\
+         What a sweep does, on one core in f32: simulated winder-seconds in a second, of a winder by itself and of \
+         sixteen side by side.\n\n\
+         | Machine | Alone | Side by side | Ratio |\n|---|---:|---:|---:|"
+    );
+    for (name, machine) in &machines {
+        interrupt::check()?;
+        let rates = batch::rates(machine, ROUNDS)?;
+        let seconds = |steps: f64| steps * 1e-3 * f64::from(PLANT_PERIOD_MS);
+        println!(
+            "| {name} | {:.0} | {:.0} | {:.1} |",
+            seconds(rates.alone),
+            seconds(rates.side_by_side),
+            rates.ratio()
+        );
     }
     for what in missing {
         println!("\nNot measured: {what}");
