@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use firmware::link::modbus::pdu::{PDU_MAX, Pdu, respond};
+use firmware::link::modbus::pdu::{Open, PDU_MAX, Pdu, respond};
 use model_core::image::{Block, COMMAND_WORDS, FEEDBACK_WORDS, Image};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -18,6 +18,7 @@ enum Ask {
     SetRegister(u16, u16),
     SetCoils(u16, Vec<bool>),
     SetRegisters(u16, Vec<u16>),
+    Mask(u16, u16, u16),
     Exchange(u16, u16, u16, Vec<u16>),
 }
 
@@ -53,6 +54,7 @@ impl Ask {
             Ask::SetRegisters(start, words) => {
                 counted(16, &[*start, words.len() as u16], &bytes(words))
             }
+            Ask::Mask(at, and, or) => [vec![22], bytes(&[*at, *and, *or])].concat(),
             Ask::Exchange(read, count, write, words) => counted(
                 23,
                 &[*read, *count, *write, words.len() as u16],
@@ -92,6 +94,8 @@ fn legal() -> impl Strategy<Value = Ask> {
         (0..COMMAND_WORDS as u16, any::<u16>()).prop_map(|(a, v)| Ask::SetRegister(a, v)),
         data(COMMAND_BITS, 1968, any::<bool>()).prop_map(|(s, bits)| Ask::SetCoils(s, bits)),
         data(COMMAND_WORDS, 123, any::<u16>()).prop_map(|(s, words)| Ask::SetRegisters(s, words)),
+        (0..COMMAND_WORDS as u16, any::<u16>(), any::<u16>())
+            .prop_map(|(a, and, or)| Ask::Mask(a, and, or)),
         (
             span(COMMAND_WORDS, 125),
             data(COMMAND_WORDS, 121, any::<u16>())
@@ -181,6 +185,16 @@ impl Model {
                 write_words(&mut self.coils, *start, words);
                 ask.encode()[..5].to_vec()
             }
+            Ask::Mask(at, and, or) => {
+                for b in 0..16 {
+                    let bit = self.coils.entry(16 * u32::from(*at) + b).or_default();
+                    // where the mask has a 1 the bit stays, elsewhere it is that of the other mask
+                    if and & 1 << b == 0 {
+                        *bit = or & 1 << b != 0;
+                    }
+                }
+                ask.encode()
+            }
             Ask::Exchange(read, count, write, words) => {
                 write_words(&mut self.coils, *write, words);
                 data(23, bytes(&read_words(&self.coils, *read, *count)))
@@ -213,7 +227,7 @@ fn hostile() -> impl Strategy<Value = Vec<u8>> {
             request.resize(request.len().saturating_add_signed(longer), 0);
             request
         });
-    let served = prop::sample::select(vec![1u8, 2, 3, 4, 5, 6, 15, 16, 23]);
+    let served = prop::sample::select(vec![1u8, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43]);
     let addressed =
         (served, vec(any::<u8>(), 0..20)).prop_map(|(f, rest)| [vec![f], rest].concat());
     prop_oneof![4 => near, 1 => addressed, 1 => vec(any::<u8>(), 0..300)]
@@ -226,7 +240,7 @@ proptest! {
     fn legal_requests_do_what_a_naive_device_does(image in image(), asks in vec(legal(), 1..20)) {
         let (mut device, mut model, mut reply) = (image, Model::of(&image), Pdu::new());
         for ask in asks {
-            respond(&ask.encode(), &mut device, &mut reply);
+            respond(&ask.encode(), &mut device, &mut Open, &mut reply);
             prop_assert_eq!(&reply[..], model.answer(&ask), "{:?}", ask);
         }
         prop_assert_eq!(device, model.image());
@@ -238,7 +252,7 @@ proptest! {
         request in hostile(),
     ) {
         let (mut device, mut reply) = (image, Pdu::new());
-        respond(&request, &mut device, &mut reply);
+        respond(&request, &mut device, &mut Open, &mut reply);
         prop_assert_eq!(device.feedback, image.feedback);
         let Some(function) = request.first() else {
             prop_assert!(reply.is_empty() && device == image);

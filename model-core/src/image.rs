@@ -5,12 +5,13 @@
 //!
 //! Two blocks of 16-bit words, commands from the PLC and feedback to it, without holes. The commands of a winder PLC
 //! come first; behind them stand the faults that a test puts in, out of reach of a PLC that writes its own words, and
-//! behind those the PLC's words that were added since. In all words but the first 20, 0 changes nothing, so that a PLC
+//! behind those the words that were added since. In all words but the first 20, 0 changes nothing, so that a PLC
 //! may write the whole block as well as its two parts. A block is only ever added to: an address keeps its meaning. A value is a scaled
 //! integer; a 32-bit counter takes two words, high word first. Bit `b` of word `w` is also the single bit
 //! `16·w + b` of the block, so that a PLC can use coils or words as it likes.
 
 use crate::exchange::{TuneAbort, TuneStep};
+use crate::link_words;
 use crate::logic;
 use crate::machine::Machine;
 use crate::profidrive;
@@ -93,6 +94,9 @@ signals! {
     WINDER_COMMAND_2: Command 30, Winder, Bits(logic::COMMAND_2_BITS), "", 1.0, 0.0 ..= 65535.0, "More commands to the winder's drive logic";
     RIDER_LOAD_SET:   Command 31, RiderRoll, U16, "%", 10.0, 0.0 ..= 200.0, "Load of the rider roll, of the machine's table; 0 is the table's own, as 100 is";
 
+    // what a test asks of the link, beyond the PLC's words again
+    RESPONSE_DELAY:   Command 32, Simulator, U16, "ms", 1.0, 0.0 ..= 1000.0, "A request over Modbus waits this long before it is done and answered";
+
     // what the drive system answers
     HEARTBEAT:        Feedback 0,  Winder, U16, "", 1.0, 0.0 ..= 65535.0, "Counts up by one each drive cycle of 10 ms";
     WINDER_STATUS:    Feedback 1,  Winder, Bits(logic::STATUS_BITS), "", 1.0, 0.0 ..= 65535.0, "State of the winder's drive logic";
@@ -154,6 +158,23 @@ signals! {
     RIDER_LOAD:       Feedback 62, RiderRoll, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Load of the rider roll per width, as it is set";
     NIP_LOAD_RD:      Feedback 63, Simulator, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Load of the rear drum's nip per width, where slip or compression is computed";
     NIP_LOAD_FD:      Feedback 64, Simulator, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Load of the front drum's nip per width, where slip or compression is computed";
+
+    // what the link tells of itself, after each request
+    LINK_STATUS:      Feedback 65, Simulator, Bits(link_words::LINK_STATUS_BITS), "", 1.0, 0.0 ..= 65535.0, "State of the link";
+    LIMITED_REGISTER: Feedback 66, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "First holding register that was written outside its limits, counted from 1; 0 when none is";
+    LINK_CLIENTS:     Feedback 67, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Clients that are connected";
+    LINK_REQUESTS:    Feedback 68, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Requests since power-up; wraps";
+    LINK_EXCEPTIONS:  Feedback 70, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Requests since power-up that were refused with an exception; wraps";
+    LINK_WRITE_AGE:   Feedback 72, Simulator, U16, "ms", 1.0, 0.0 ..= 65535.0, "Time since the winder's commands were last written; 65535 when it is longer or they never were";
+    LINE_ERRORS:      Feedback 73, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Frames of the serial line since power-up that were not whole; stays at its largest";
+    POLLS_5_MS:       Feedback 74, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls up to 5 ms after the client's last one; wraps, as all polls do";
+    POLLS_10_MS:      Feedback 76, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after 5 to 10 ms";
+    POLLS_20_MS:      Feedback 78, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after 10 to 20 ms";
+    POLLS_50_MS:      Feedback 80, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after 20 to 50 ms";
+    POLLS_100_MS:     Feedback 82, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after 50 to 100 ms";
+    POLLS_200_MS:     Feedback 84, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after 100 to 200 ms";
+    POLLS_500_MS:     Feedback 86, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after 200 to 500 ms";
+    POLLS_LONGER:     Feedback 88, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after more than 500 ms";
 }
 
 /// Jog speed at power-up, m/min.
@@ -309,7 +330,8 @@ mod tests {
     #[test]
     fn the_words_of_the_plc_stand_before_and_behind_the_simulator_s() {
         for s in SIGNALS.iter().filter(|s| s.direction == Direction::Command) {
-            let of_simulator = (FAULT_MACHINE.word..=BUS_DELAY.word).contains(&s.word);
+            let injected = (FAULT_MACHINE.word..=BUS_DELAY.word).contains(&s.word);
+            let of_simulator = injected || s.word >= RESPONSE_DELAY.word;
             assert_eq!(s.section == Section::Simulator, of_simulator, "{}", s.name);
         }
         assert_eq!(PLC_COMMAND_WORDS, usize::from(FAULT_MACHINE.word));

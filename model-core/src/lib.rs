@@ -13,6 +13,7 @@ pub mod drive;
 pub mod exchange;
 pub mod fixed;
 pub mod image;
+pub mod link_words;
 pub mod logic;
 pub mod machine;
 pub mod plant;

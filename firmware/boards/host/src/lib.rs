@@ -14,9 +14,10 @@ use std::time::{Duration, Instant};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embedded_io_adapters::tokio_1::FromTokio;
 use firmware::journal::Journal;
-use firmware::link;
+use firmware::link::control::{Access, Control, Peer, Protocol};
 use firmware::link::modbus::tcp::{End, Timeouts, session};
 use firmware::link::seats::Seats;
+use firmware::link::{self, Service};
 use firmware::lockstep::Lockstep;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::machine::Machine;
@@ -35,13 +36,18 @@ const ACCEPT_AGAIN: Duration = Duration::from_millis(10);
 /// The process image, shared by the threads of this process.
 pub type ImageCell = link::ImageCell<CriticalSectionRawMutex>;
 
+/// Control of the winder, likewise.
+pub type ControlCell = link::ControlCell<CriticalSectionRawMutex>;
+
 /// What a board starts with.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// Modbus port on loopback; 0 for any that is free.
     pub port: u16,
     /// How long a client may keep a place without using it.
     pub timeouts: Timeouts,
+    /// Which client may do what.
+    pub access: Access,
     /// The image at power-up.
     pub image: Image,
     /// How many times real time the steps run; 1 is real time.
@@ -53,6 +59,7 @@ impl Default for Options {
         Self {
             port: 0,
             timeouts: Timeouts::default(),
+            access: Access::default(),
             image: Image {
                 commands: Commands::of(&Machine::news_8000()),
                 feedback: Feedback::default(),
@@ -68,6 +75,8 @@ pub struct Board {
     pub address: SocketAddr,
     /// What the clients see.
     pub image: Arc<ImageCell>,
+    /// Who controls the winder, and who is connected.
+    pub control: Arc<ControlCell>,
     running: Option<Running>,
 }
 
@@ -91,6 +100,8 @@ impl Board {
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let image = Arc::new(ImageCell::new(RefCell::new(options.image)));
+        let control = Control::new(options.access);
+        let control = Arc::new(ControlCell::new(RefCell::new(control)));
 
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
@@ -102,6 +113,7 @@ impl Board {
         let server = Arc::new(Server {
             listener,
             image: image.clone(),
+            control: control.clone(),
             seats: Seats::new(),
             timeouts: options.timeouts,
         });
@@ -122,6 +134,7 @@ impl Board {
         Ok(Self {
             address,
             image,
+            control,
             running: Some(Running {
                 links: (stop_links, links),
                 steps: (stop_steps, steps),
@@ -176,24 +189,40 @@ fn pace(
 struct Server {
     listener: TcpListener,
     image: Arc<ImageCell>,
+    control: Arc<ControlCell>,
     seats: Seats<CriticalSectionRawMutex, CLIENTS>,
     timeouts: Timeouts,
 }
 
 impl Server {
+    /// A client, where it may come in.
+    fn enter(&self, from: SocketAddr) -> Option<link::Client<'_, CriticalSectionRawMutex>> {
+        let SocketAddr::V4(from) = from else {
+            return None;
+        };
+        let service = Service {
+            image: &self.image,
+            control: &self.control,
+        };
+        service.enter(Peer::Ip(*from.ip()), Protocol::ModbusTcp)
+    }
+
     /// One client after the other. As on the other boards this is a task of its own for good, not for one client:
     /// the queue of timers has a place for each task, and keeps that of one that is gone until it expires.
     async fn serve(self: Arc<Self>) {
         loop {
-            let Ok((stream, _)) = self.listener.accept().await else {
+            let Ok((stream, from)) = self.listener.accept().await else {
                 tokio::time::sleep(ACCEPT_AGAIN).await;
+                continue;
+            };
+            let Some(client) = self.enter(from) else {
                 continue;
             };
             let seat = self.seats.take();
             // Without it a reply may wait for the client's delayed acknowledgement.
             let _ = stream.set_nodelay(true);
             let mut stream = FromTokio::new(stream);
-            let session = session(&mut stream, &self.image, &self.timeouts, || seat.answered());
+            let session = session(&mut stream, &client, &self.timeouts, || seat.answered());
             if seat.hold(session).await == Some(End::NotReading) {
                 // Not to be kept by the system either, with replies that nobody will fetch.
                 let _ = stream.inner().set_zero_linger();

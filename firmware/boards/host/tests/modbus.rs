@@ -3,14 +3,17 @@
 //! Loopback only, and every dialogue has to end in time.
 
 use std::io::ErrorKind;
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use board_host::{Board, CLIENTS, Options};
 use embassy_time::Duration as Ticks;
+use firmware::link::control::{Access, Right};
 use firmware::link::modbus::tcp::Timeouts;
-use model_core::image::{COMMAND_WORDS, Image};
+use model_core::image::{COMMAND_WORDS, Image, LINK_STATUS, RESPONSE_DELAY, TENSION_SET, V_SET};
+use model_core::link_words::link_status;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
+use tokio::net::{TcpSocket, TcpStream};
 use tokio::time::{sleep, timeout};
 use tokio_modbus::client::{Context, tcp};
 use tokio_modbus::prelude::{ExceptionCode, Reader, Writer};
@@ -86,7 +89,8 @@ async fn every_function_makes_the_round_trip() {
             [0xbeef]
         );
         // 16: the whole block, as PLCs do
-        let all: [u16; COMMAND_WORDS] = std::array::from_fn(|w| 0x8000 + w as u16);
+        let mut all: [u16; COMMAND_WORDS] = std::array::from_fn(|w| 0x8000 + w as u16);
+        all[usize::from(RESPONSE_DELAY.word)] = 0;
         c.write_multiple_registers(0, &all).await.unwrap().unwrap();
         let read = c.read_holding_registers(0, COMMAND_WORDS as u16);
         assert_eq!(read.await.unwrap().unwrap(), all);
@@ -119,13 +123,16 @@ async fn a_decent_client_understands_the_refusals() {
                 .await
                 .unwrap()
                 .unwrap_err(),
-            c.masked_write_register(0, 0, 0).await.unwrap().unwrap_err(),
+            c.masked_write_register(end, 0, 0)
+                .await
+                .unwrap()
+                .unwrap_err(),
         ];
         let codes = [
             ExceptionCode::IllegalDataAddress,
             ExceptionCode::IllegalDataValue,
             ExceptionCode::IllegalDataAddress,
-            ExceptionCode::IllegalFunction,
+            ExceptionCode::IllegalDataAddress,
         ];
         assert_eq!(refused, codes);
     })
@@ -190,7 +197,8 @@ async fn writes_are_whole_and_reads_are_not_torn() {
     assert_eq!(in_time(written).await.expect("connected"), Ok(()));
     let write = async {
         for value in 0..1000u16 {
-            let words = [value; COMMAND_WORDS];
+            let mut words = [value; COMMAND_WORDS];
+            words[usize::from(RESPONSE_DELAY.word)] = 0;
             writer
                 .write_multiple_registers(0, &words)
                 .await
@@ -207,7 +215,8 @@ async fn writes_are_whole_and_reads_are_not_torn() {
                 .unwrap()
                 .unwrap();
             if words[1] == words[2] {
-                assert!(words.iter().all(|word| *word == words[1]), "{words:?}");
+                let written = &words[..usize::from(RESPONSE_DELAY.word)];
+                assert!(written.iter().all(|word| *word == words[1]), "{words:?}");
                 last = words[1];
             }
         }
@@ -374,4 +383,80 @@ async fn who_never_reads_is_dropped_and_blocks_nobody() {
     assert!(polls > 10);
     (&mut flood).await.unwrap();
     is_served(&mut plc, 0).await;
+}
+
+/// A client at another address of loopback.
+async fn client_from(board: &Board, last: u8) -> Context {
+    let socket = TcpSocket::new_v4().expect("a socket");
+    let address = SocketAddr::from(([127, 0, 0, last], 0));
+    socket.bind(address).expect("an address of loopback");
+    tcp::attach(socket.connect(board.address).await.expect("a listener"))
+}
+
+#[tokio::test]
+async fn one_plc_controls_and_the_others_read_and_put_in_faults() {
+    let board = board(Timeouts::default());
+    let (mut plc, mut other) = (client_from(&board, 1).await, client_from(&board, 2).await);
+    in_time(async {
+        let busy = Err(ExceptionCode::ServerDeviceBusy);
+        plc.write_single_register(6, 1000).await.unwrap().unwrap();
+        assert_eq!(other.write_single_register(6, 2000).await.unwrap(), busy);
+        // faults and commands in one request: none of it counts
+        let faults = other.write_multiple_registers(19, &[500, 1]).await;
+        assert_eq!(faults.unwrap(), busy);
+        let read = other.read_holding_registers(6, 15).await.unwrap().unwrap();
+        assert_eq!((read[0], read[14]), (1000, 0));
+        let fault = other.write_single_register(20, 1).await;
+        assert_eq!(fault.unwrap(), Ok(()));
+        let status = plc.read_input_registers(LINK_STATUS.word, 3).await;
+        let controls = link_status::PLC_CONTROLS;
+        assert_eq!(status.unwrap().unwrap(), [controls, 0, 2]);
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn the_access_table_keeps_clients_out_or_from_writing() {
+    let mut access = Access::default();
+    assert!(access.set([127, 0, 0, 2].into(), Right::Read));
+    assert!(access.set([127, 0, 0, 3].into(), Right::None));
+    let options = Options {
+        access,
+        ..Options::default()
+    };
+    let board = Board::start(options, still).expect("a free port");
+    let (mut reader, mut nobody) = (client_from(&board, 2).await, client_from(&board, 3).await);
+    in_time(async {
+        assert!(reader.read_holding_registers(0, 5).await.unwrap().is_ok());
+        for register in [6, 20] {
+            let write = reader.write_single_register(register, 1).await.unwrap();
+            assert_eq!(write, Err(ExceptionCode::IllegalFunction), "{register}");
+        }
+        assert!(nobody.read_holding_registers(0, 1).await.is_err());
+    })
+    .await;
+    is_served(&mut client(&board).await, 1).await;
+}
+
+#[tokio::test]
+async fn a_set_point_outside_its_limits_is_named_and_costs_the_block_nothing() {
+    let board = board(Timeouts::default());
+    let mut plc = client(&board).await;
+    in_time(async {
+        let v_set = usize::from(V_SET.word);
+        let mut block = board.image.lock(|image| image.borrow().commands.words);
+        (block[v_set], block[v_set + 2]) = (30_000, 700);
+        plc.write_multiple_registers(0, &block)
+            .await
+            .unwrap()
+            .unwrap();
+        let link = plc.read_input_registers(LINK_STATUS.word, 2).await;
+        let link = link.unwrap().unwrap();
+        let status = link_status::LIMITED | link_status::PLC_CONTROLS;
+        assert_eq!(link, [status, V_SET.word + 1]);
+        let commands = board.image.lock(|image| image.borrow().commands);
+        assert!(commands.get::<f32>(&V_SET) <= V_SET.limits.1);
+        assert_eq!(commands.word(&TENSION_SET), 700);
+    })
+    .await;
 }

@@ -5,10 +5,13 @@
 
 use embassy_executor::Spawner;
 use embassy_net::tcp::TcpSocket;
-use embassy_net::{Config, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4};
+use embassy_net::{
+    Config, IpAddress, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4,
+};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::{Duration, with_timeout};
-use firmware::link::ImageCell;
+use firmware::link::Service;
+use firmware::link::control::{Peer, Protocol};
 use firmware::link::modbus::tcp::{End, Timeouts, session};
 use firmware::link::seats::Seats;
 use static_cell::StaticCell;
@@ -36,13 +39,13 @@ const TIMEOUT: Duration = Duration::from_secs(15);
 /// The time for the last bytes of a connection to get through.
 const CLOSING: Duration = Duration::from_secs(2);
 
-/// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
-pub type LocalImage = ImageCell<NoopRawMutex>;
+/// What the background's tasks share: they take turns, so a lock need not keep anything off.
+pub type LocalService = Service<'static, NoopRawMutex>;
 
 type Places = Seats<NoopRawMutex, MODBUS_CLIENTS>;
 
 /// Starts the network. Runs in the background, where everything of the network stays.
-pub fn start(spawner: Spawner, image: &'static LocalImage) {
+pub fn start(spawner: Spawner, service: LocalService) {
     static RESOURCES: StaticCell<StackResources<MODBUS_SOCKETS>> = StaticCell::new();
     static PLACES: StaticCell<Places> = StaticCell::new();
 
@@ -63,7 +66,7 @@ pub fn start(spawner: Spawner, image: &'static LocalImage) {
     spawner.spawn(run(runner).expect("one runner"));
     let places = &*PLACES.init(Places::new());
     for _ in 0..MODBUS_SOCKETS {
-        spawner.spawn(serve_modbus(stack, image, places).expect("as many tasks as sockets"));
+        spawner.spawn(serve_modbus(stack, service, places).expect("as many tasks as sockets"));
     }
 }
 
@@ -74,11 +77,7 @@ async fn run(mut runner: Runner<'static, Lan9118>) -> ! {
 
 /// One client after the other.
 #[embassy_executor::task(pool_size = MODBUS_SOCKETS)]
-async fn serve_modbus(
-    stack: Stack<'static>,
-    image: &'static LocalImage,
-    places: &'static Places,
-) -> ! {
+async fn serve_modbus(stack: Stack<'static>, service: LocalService, places: &'static Places) -> ! {
     let mut rx = [0; BUFFER_BYTES];
     let mut tx = [0; BUFFER_BYTES];
     let timeouts = Timeouts::default();
@@ -89,11 +88,17 @@ async fn serve_modbus(
     socket.set_nagle_enabled(false);
     loop {
         if socket.accept(MODBUS_PORT).await.is_ok() {
-            let place = places.take();
-            let talk = session(&mut socket, image, &timeouts, || place.answered());
-            if place.hold(talk).await == Some(End::Closed) {
-                socket.close();
-                let _ = with_timeout(CLOSING, socket.flush()).await;
+            let peer = socket.remote_endpoint().map(|from| match from.addr {
+                IpAddress::Ipv4(address) => Peer::Ip(address),
+            });
+            let client = peer.and_then(|peer| service.enter(peer, Protocol::ModbusTcp));
+            if let Some(client) = client {
+                let place = places.take();
+                let talk = session(&mut socket, &client, &timeouts, || place.answered());
+                if place.hold(talk).await == Some(End::Closed) {
+                    socket.close();
+                    let _ = with_timeout(CLOSING, socket.flush()).await;
+                }
             }
         }
         // Whatever state it is in: the socket must be closed to listen again.

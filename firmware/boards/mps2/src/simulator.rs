@@ -8,9 +8,11 @@
 use core::cell::RefCell;
 
 use embassy_executor::Spawner;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::journal::Journal;
-use firmware::link::ImageCell;
+use firmware::link::control::Control;
+use firmware::link::{ControlCell, ImageCell};
 use firmware::tasks::{self, Exchange};
 use firmware::{SPANS, Scalar};
 use model_core::drive::Drive;
@@ -20,7 +22,10 @@ use model_core::machine::Machine;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
-use crate::net::LocalImage;
+use crate::net::LocalService;
+
+/// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
+type LocalImage = ImageCell<NoopRawMutex>;
 
 /// What the tasks share, made once.
 pub fn exchange() -> &'static Exchange {
@@ -51,16 +56,18 @@ pub async fn drive(start: Instant, exchange: &'static Exchange) {
 #[embassy_executor::task]
 pub async fn background(exchange: &'static Exchange) {
     static IMAGE: StaticCell<LocalImage> = StaticCell::new();
+    static CONTROL: StaticCell<ControlCell<NoopRawMutex>> = StaticCell::new();
 
     let image = &*IMAGE.init(ImageCell::new(RefCell::new(Image {
         commands: Commands::of(&machine()),
         feedback: Feedback::default(),
     })));
+    let control = &*CONTROL.init(ControlCell::new(RefCell::new(Control::default())));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(exchange, image).expect("first"));
     spawner.spawn(crate::pace::pace().expect("first"));
-    crate::net::start(spawner, image);
+    crate::net::start(spawner, LocalService { image, control });
 }
 
 #[embassy_executor::task]

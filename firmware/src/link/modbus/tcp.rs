@@ -11,12 +11,13 @@
 use core::mem;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
-use embassy_time::{Duration, Instant, with_deadline, with_timeout};
+use embassy_time::{Duration, Instant, Timer, with_deadline, with_timeout};
 use embedded_io_async::{Error as _, ErrorKind, Read, Write};
 use heapless::Vec;
 
-use super::pdu::{PDU_MAX, Pdu, respond};
-use crate::link::ImageCell;
+use super::pdu::{PDU_MAX, Pdu};
+use super::{response_delay, serve};
+use crate::link::Client;
 
 /// The MBAP header up to and with the length, which counts what follows it; in bytes.
 const PREFIX: usize = 6;
@@ -147,11 +148,11 @@ pub enum End {
 
 /// Serves one client until it goes, or has to; the caller then closes or aborts the stream.
 ///
-/// Requests are answered one by one in their order, each under one lock of the image. `answered` is called after
+/// Requests are answered one by one in their order, each as one event on the image. `answered` is called after
 /// each reply. What is written must travel without being flushed, and without Nagle's delay.
 pub async fn session<S, M>(
     stream: &mut S,
-    image: &ImageCell<M>,
+    client: &Client<'_, M>,
     timeouts: &Timeouts,
     mut answered: impl FnMut(),
 ) -> End
@@ -173,7 +174,13 @@ where
         let mut begins = requests.is_empty();
         loop {
             let reply = match requests.push(&mut input) {
-                Ok(Some(request)) => reply(&request, image),
+                Ok(Some(request)) => {
+                    let delay = response_delay(&client.service());
+                    if delay > Duration::MIN {
+                        Timer::after(delay).await;
+                    }
+                    reply(&request, client)
+                }
                 Ok(None) => break,
                 Err(Malformed) => return End::Malformed,
             };
@@ -194,9 +201,9 @@ where
 }
 
 /// The whole reply frame, to go out in one piece.
-fn reply<M: RawMutex>(request: &Adu, image: &ImageCell<M>) -> Vec<u8, ADU_MAX> {
+fn reply<M: RawMutex>(request: &Adu, client: &Client<'_, M>) -> Vec<u8, ADU_MAX> {
     let mut pdu = Pdu::new();
-    image.lock(|image| respond(request.pdu, &mut image.borrow_mut(), &mut pdu));
+    serve(client, request.pdu, &mut pdu);
     let [t, u] = request.transaction;
     let [p, q] = PROTOCOL;
     let [a, b] = ((UNIT + pdu.len()) as u16).to_be_bytes();
