@@ -7,6 +7,7 @@
 pub mod journal;
 pub mod link;
 pub mod lockstep;
+pub mod store;
 pub mod tasks;
 pub mod wired;
 
