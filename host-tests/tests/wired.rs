@@ -272,7 +272,7 @@ proptest! {
 
     /// A wire can stop, never start.
     #[test]
-    fn wires_only_take_away(words in prop::array::uniform32(any::<u16>()), bits in 0..8_u8) {
+    fn wires_only_take_away(words in prop::array::uniform32(any::<u16>()), bits in 0..16_u8) {
         let mut commands = Commands::default();
         for (word, any) in commands.words.iter_mut().zip(words) {
             *word = any;
@@ -281,11 +281,14 @@ proptest! {
             emergency_stop_closed: bits & 1 == 0,
             run_permit: bits & 2 == 0,
             drum_brakes: bits & 4 != 0,
+            acknowledge: bits & 8 != 0,
         };
         let acted = inputs.act_on(&commands);
-        let brakes = if inputs.drum_brakes { command::DRUM_BRAKES } else { 0 };
+        let bit = |on, bit| if on { bit } else { 0 };
+        let may_set_bits = bit(inputs.drum_brakes, command::DRUM_BRAKES)
+            | bit(inputs.acknowledge, command::ACKNOWLEDGE);
         for (w, (old, new)) in commands.words.iter().zip(acted.words).enumerate() {
-            let may_set = if w == usize::from(image::WINDER_COMMAND.word) { brakes } else { 0 };
+            let may_set = bit(w == usize::from(image::WINDER_COMMAND.word), may_set_bits);
             prop_assert_eq!(new & !old & !may_set, 0, "word {}", w);
         }
         prop_assert_eq!(Inputs::default().act_on(&commands), commands);

@@ -16,6 +16,8 @@ pub struct Inputs {
     pub run_permit: bool,
     /// The PLC's output for the drum brakes: closes them at standstill.
     pub drum_brakes: bool,
+    /// A person acknowledges faults.
+    pub acknowledge: bool,
 }
 
 impl Default for Inputs {
@@ -25,6 +27,7 @@ impl Default for Inputs {
             emergency_stop_closed: true,
             run_permit: true,
             drum_brakes: false,
+            acknowledge: false,
         }
     }
 }
@@ -34,8 +37,9 @@ impl Inputs {
     /// emergency-stop circuit is OFF3 in every section, and a missing run permit takes the run command away.
     pub fn act_on(&self, commands: &Commands) -> Commands {
         let mut commands = *commands;
-        let mut clear = |signal: &Signal, bits: u16| {
-            commands.set_word(signal, commands.word(signal) & !bits);
+        let mut put = |signal: &Signal, bits: u16, set: bool| {
+            let word = commands.word(signal);
+            commands.set_word(signal, if set { word | bits } else { word & !bits });
         };
         if !self.emergency_stop_closed {
             for word in [
@@ -44,15 +48,17 @@ impl Inputs {
                 &image::STW1_FD,
                 &image::STW1_RR,
             ] {
-                clear(word, stw1::NO_QUICK_STOP);
+                put(word, stw1::NO_QUICK_STOP, false);
             }
         }
         if !self.run_permit {
-            clear(&image::WINDER_COMMAND, command::RUN);
+            put(&image::WINDER_COMMAND, command::RUN, false);
         }
         if self.drum_brakes {
-            let word = commands.word(&image::WINDER_COMMAND) | command::DRUM_BRAKES;
-            commands.set_word(&image::WINDER_COMMAND, word);
+            put(&image::WINDER_COMMAND, command::DRUM_BRAKES, true);
+        }
+        if self.acknowledge {
+            put(&image::WINDER_COMMAND, command::ACKNOWLEDGE, true);
         }
         commands
     }
