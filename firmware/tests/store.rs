@@ -279,7 +279,7 @@ fn ten_writes_at_once_and_then_one_in_a_quarter_of_an_hour() {
 }
 
 proptest! {
-    /// Whatever stands in the flash: it is settings, or it is refused, and it stays.
+    /// Whatever stands in the flash: it is settings, or it is refused; what is foreign stays.
     #[test]
     fn no_content_panics_or_is_overwritten(
         whole in any::<bool>(),
@@ -299,7 +299,8 @@ proptest! {
             Content::Unusable(Unusable::Flash | Unusable::Invalid(Invalid::Form)) => prop_assert!(false),
             Content::Blank | Content::Unusable(_) => (),
         }
-        prop_assert_eq!(before, flash.bytes);
+        // its own log may repair itself
+        prop_assert!(whole || before == flash.bytes);
     }
 }
 

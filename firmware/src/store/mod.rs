@@ -103,16 +103,16 @@ impl<F: NorFlash> Store<F> {
         }
         match fetch(ReadOnly(&mut self.flash), &self.range).await {
             // The log repairs itself where the power has failed; it may do so with what is its own.
-            Fetched::Failed(Refused::ReadOnly) => match self.holds(|bytes| bytes == KEY).await {
+            Err(Refused::ReadOnly) => match self.holds(|bytes| bytes == KEY).await {
                 Ok(true) => match fetch(&mut self.flash, &self.range).await {
-                    Fetched::Content(content) => content,
-                    Fetched::Failed(_) => Content::Unusable(Unusable::Flash),
+                    Ok(content) => content,
+                    Err(_) => Content::Unusable(Unusable::Flash),
                 },
                 Ok(false) => Content::Unusable(Unusable::Foreign),
                 Err(()) => Content::Unusable(Unusable::Flash),
             },
-            Fetched::Failed(Refused::Flash(_)) => Content::Unusable(Unusable::Flash),
-            Fetched::Content(content) => content,
+            Err(Refused::Flash(_)) => Content::Unusable(Unusable::Flash),
+            Ok(content) => content,
         }
     }
 
@@ -162,24 +162,19 @@ impl<F: NorFlash> Store<F> {
 /// A byte of erased flash.
 const ERASED: u8 = 0xff;
 
-/// What reading has come to.
-enum Fetched<E> {
-    Content(Content),
-    Failed(E),
-}
-
-async fn fetch<F: NorFlash>(flash: F, range: &Range<u32>) -> Fetched<F::Error> {
-    let foreign = Fetched::Content(Content::Unusable(Unusable::Foreign));
+/// What the log holds; fails where the flash does.
+async fn fetch<F: NorFlash>(flash: F, range: &Range<u32>) -> Result<Content, F::Error> {
+    let foreign = Ok(Content::Unusable(Unusable::Foreign));
     let mut buffer = [0; BUFFER];
     let Some(mut map) = map(flash, range) else {
         return foreign;
     };
     match map.fetch_item::<&[u8]>(&mut buffer, &KEY).await {
-        Ok(Some(bytes)) => Fetched::Content(match Settings::decode(bytes) {
+        Ok(Some(bytes)) => Ok(match Settings::decode(bytes) {
             Ok(settings) => Content::Settings(settings),
             Err(invalid) => Content::Unusable(Unusable::Invalid(invalid)),
         }),
-        Err(sequential_storage::Error::Storage { value, .. }) => Fetched::Failed(value),
+        Err(sequential_storage::Error::Storage { value, .. }) => Err(value),
         _ => foreign,
     }
 }

@@ -363,7 +363,6 @@ impl Machine {
             },
             encoder_pulses: 4096.0,
             encoder_pulses_uw: 1024.0,
-            ..news
         }
     }
 }

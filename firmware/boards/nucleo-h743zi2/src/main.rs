@@ -107,10 +107,16 @@ fn main() -> ! {
             rd: (p.TIM2, p.TIM1, p.PB10, p.PB11),
             uw: (p.TIM5, p.TIM8, p.PA0, p.PA3),
             dac: (p.DAC1, p.PA4),
-            wired: p.PG14,
-            switches: (p.PF13, p.PF14, p.PF15),
+            wired: p.PG14.into(),
+            switches: [p.PF13.into(), p.PF14.into(), p.PF15.into()],
             button,
-            relays: (p.PE9, p.PE11, p.PE13, p.PF12, p.PD15),
+            relays: [
+                p.PE9.into(),
+                p.PE11.into(),
+                p.PE13.into(),
+                p.PF12.into(),
+                p.PD15.into(),
+            ],
         },
     );
     let ethernet = net::Resources {

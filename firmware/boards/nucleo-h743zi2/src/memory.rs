@@ -53,7 +53,7 @@ pub fn prepare(core: &mut Peripherals) {
 /// The Ethernet's frames; called once, after [`prepare`].
 pub fn queue() -> &'static mut Queue {
     // SAFETY: only this function names it, and `static_cell` makes sure that it is called once.
-    let queue = unsafe { &mut *(&raw mut QUEUE) };
+    let queue = unsafe { &mut *core::ptr::addr_of_mut!(QUEUE) };
     PacketQueue::init(queue);
     // SAFETY: the line above has initialized all of it.
     unsafe { queue.assume_init_mut() }

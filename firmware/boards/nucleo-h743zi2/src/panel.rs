@@ -40,7 +40,9 @@ pub async fn run(mut panel: Panel, exchange: &'static Exchange) -> ! {
     loop {
         Timer::after_millis(PERIOD_MS).await;
         beat = beat.wrapping_add(1);
-        panel.green.set_level((beat / BLINK % 2 == 0).into());
+        panel
+            .green
+            .set_level((beat / BLINK).is_multiple_of(2).into());
         panel.red.set_level(exchange.outputs().fault.into());
         panel.yellow.set_low();
     }

@@ -7,12 +7,9 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::dac::{DacChannel, Value};
-use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::gpio::{AnyPin, Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::mode::Blocking;
-use embassy_stm32::peripherals::{
-    DAC1, PA0, PA3, PA4, PB10, PB11, PD15, PE9, PE11, PE13, PF12, PF13, PF14, PF15, PG14, TIM1,
-    TIM2, TIM5, TIM8,
-};
+use embassy_stm32::peripherals::{DAC1, PA0, PA3, PA4, PB10, PB11, TIM1, TIM2, TIM5, TIM8};
 use embassy_stm32::timer::low_level::{
     MasterMode, OutputCompareMode, SlaveMode, Timer, TriggerSource,
 };
@@ -139,23 +136,13 @@ pub struct Resources {
     /// Load cells.
     pub dac: (Peri<'static, DAC1>, Peri<'static, PA4>),
     /// To ground: the switches are wired.
-    pub wired: Peri<'static, PG14>,
+    pub wired: Peri<'static, AnyPin>,
     /// Emergency-stop circuit, run permit, drum brakes.
-    pub switches: (
-        Peri<'static, PF13>,
-        Peri<'static, PF14>,
-        Peri<'static, PF15>,
-    ),
+    pub switches: [Peri<'static, AnyPin>; 3],
     /// The board's blue button.
     pub button: Input<'static>,
     /// Web whole, brakes of unwind, rear and front drum, fault.
-    pub relays: (
-        Peri<'static, PE9>,
-        Peri<'static, PE11>,
-        Peri<'static, PE13>,
-        Peri<'static, PF12>,
-        Peri<'static, PD15>,
-    ),
+    pub relays: [Peri<'static, AnyPin>; 5],
 }
 
 impl Wires {
@@ -190,19 +177,9 @@ impl Wires {
             dac: DacChannel::new_blocking(r.dac.0, r.dac.1),
             load_cells: Analog::new(machine.load_cells.full_scale_n as f32, DAC_FULL),
             wired: Input::new(r.wired, Pull::Up),
-            switches: [
-                Input::new(r.switches.0, Pull::Down),
-                Input::new(r.switches.1, Pull::Down),
-                Input::new(r.switches.2, Pull::Down),
-            ],
+            switches: r.switches.map(|pin| Input::new(pin, Pull::Down)),
             button: r.button,
-            relays: [
-                Output::new(r.relays.0, Level::Low, Speed::Low),
-                Output::new(r.relays.1, Level::Low, Speed::Low),
-                Output::new(r.relays.2, Level::Low, Speed::Low),
-                Output::new(r.relays.3, Level::Low, Speed::Low),
-                Output::new(r.relays.4, Level::Low, Speed::Low),
-            ],
+            relays: r.relays.map(|pin| Output::new(pin, Level::Low, Speed::Low)),
         }
     }
 
