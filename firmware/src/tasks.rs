@@ -15,13 +15,14 @@ use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer};
 use model_core::drive::{DRIVE_PERIOD_MS, Drive};
 use model_core::exchange::{Actuators, DriveCommand, DriveStatus, Measurements};
-use model_core::image::{self, Feedback};
+use model_core::image::{self, Feedback, Image};
 use model_core::logic::{Logic, command};
 use model_core::plant::PLANT_PERIOD_MS;
 use model_core::simulator::{Plant, Record, logic_tick};
 
 use crate::journal::{Journal, Observer};
 use crate::link::ImageCell;
+use crate::wired::{Inputs, Outputs};
 use crate::{SPANS, Scalar};
 
 /// A value that one task leaves for another; the latest counts.
@@ -53,6 +54,8 @@ pub struct Exchange {
     measurements: Mailbox<(Measurements<Scalar>, Record)>,
     command: Mailbox<DriveCommand<Scalar>>,
     cycle: Signal<CriticalSectionRawMutex, Cycle>,
+    inputs: Mailbox<Inputs>,
+    outputs: Mailbox<Outputs>,
     plant_times: Mailbox<Times>,
     drive_times: Mailbox<Times>,
 }
@@ -64,6 +67,8 @@ impl Default for Exchange {
             measurements: Mailbox::new((Measurements::default(), Record::default())),
             command: Mailbox::new(DriveCommand::default()),
             cycle: Signal::new(),
+            inputs: Mailbox::new(Inputs::default()),
+            outputs: Mailbox::new(Outputs::default()),
             plant_times: Mailbox::new(Times::default()),
             drive_times: Mailbox::new(Times::default()),
         }
@@ -167,9 +172,10 @@ pub async fn logic<M: RawMutex>(
 
         let snapshot = image.lock(|image| {
             let image = &mut *image.borrow_mut();
+            let commands = exchange.inputs.get().act_on(&image.commands);
             let command = logic_tick(
                 logic,
-                &image.commands,
+                &commands,
                 &cycle.measurements,
                 &cycle.status,
                 &cycle.record,
@@ -177,7 +183,8 @@ pub async fn logic<M: RawMutex>(
             );
             exchange.command.set(command);
             exchange.report_times(missed, &mut image.feedback);
-            *image
+            exchange.outputs.set(Outputs::of(&image.feedback));
+            Image { commands, ..*image }
         });
         observer.look(cycle.number, &snapshot, journal);
         let word = snapshot.commands.word(&image::WINDER_COMMAND);
@@ -190,6 +197,21 @@ pub async fn logic<M: RawMutex>(
 }
 
 impl Exchange {
+    /// What can be measured since the plant's last activation.
+    pub fn measurements(&self) -> Measurements<Scalar> {
+        self.measurements.get().0
+    }
+
+    /// What the hard-wired outputs show.
+    pub fn outputs(&self) -> Outputs {
+        self.outputs.get()
+    }
+
+    /// What stands at the hard-wired inputs from now on.
+    pub fn set_inputs(&self, inputs: Inputs) {
+        self.inputs.set(inputs);
+    }
+
     fn report_times(&self, logic_overruns: u16, feedback: &mut Feedback) {
         let (plant, drive) = (self.plant_times.get(), self.drive_times.get());
         for (signal, value) in [

@@ -67,6 +67,13 @@ pub fn twin(target: &str, warnings: Warnings) -> Result<PathBuf> {
     firmware("board-mps2-twin", &what, target, warnings)
 }
 
+/// The firmware for the dev board: an ELF file, built where it is not up to date.
+pub fn nucleo(warnings: Warnings) -> Result<PathBuf> {
+    target(TARGET)?;
+    let what = "the firmware for the NUCLEO-H743ZI2";
+    firmware("board-nucleo-h743zi2", what, TARGET, warnings)
+}
+
 /// A board's package for its target: an ELF file, built where it is not up to date.
 fn firmware(package: &str, what: &str, target: &str, warnings: Warnings) -> Result<PathBuf> {
     const PROFILE: &str = "firmware";

@@ -152,10 +152,20 @@ impl<R: Scalar, const SPANS: usize> Simulator<R, SPANS> {
 
     /// One drive cycle of 10 ms: the plant's ticks up to it, the regulators, the logic.
     pub fn drive_cycle(&mut self, image: &mut Image) {
+        self.drive_cycle_seen(image, |_| ());
+    }
+
+    /// The same; `see` is shown what can be measured after each tick of the plant.
+    pub fn drive_cycle_seen(
+        &mut self,
+        image: &mut Image,
+        mut see: impl FnMut(&Measurements<R::Si>),
+    ) {
         let end = self.phase_ms + DRIVE_PERIOD_MS;
         let plant_ticks = end / PLANT_PERIOD_MS - self.phase_ms / PLANT_PERIOD_MS;
         for _ in 0..plant_ticks {
             (self.measurements, self.record) = self.plant.tick(&self.actuators);
+            see(&self.measurements);
         }
         self.phase_ms = end % (PLANT_PERIOD_MS * DRIVE_PERIOD_MS);
         (self.actuators, self.status) = self.drive.step(&self.command, &self.measurements);

@@ -4,7 +4,9 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use host_tests::command::{bench, demo, figures, machine, replay, run, scenario, signals, test};
+use host_tests::command::{
+    bench, demo, figures, flash, machine, replay, run, scenario, signals, test,
+};
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
 
@@ -41,6 +43,10 @@ enum Command {
     ///
     /// Installs and builds what is missing; what cannot be had is named, and the rest is measured.
     Bench(bench::Args),
+    /// Flash the firmware to a NUCLEO-H743ZI2 and show its log until Ctrl-C
+    ///
+    /// Builds it; says what is missing when probe-rs or the board is not there.
+    Flash(flash::Args),
     /// Run the winder alone, open loop, from a schedule of torques
     Plant(plant::Options),
     /// Print a machine as a file: every parameter with its unit, limits and description
@@ -80,6 +86,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         Command::Demo(args) => interrupt::install().and_then(|()| demo::main(&args)),
         Command::Run(args) => interrupt::install().and_then(|()| run::main(args)),
         Command::Bench(args) => interrupt::install().and_then(|()| bench::main(&args)),
+        Command::Flash(args) => interrupt::install().and_then(|()| flash::main(&args)),
         Command::Test => interrupt::install().and_then(|()| test::main()),
     }
 }

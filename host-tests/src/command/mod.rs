@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod demo;
 pub mod figures;
+pub mod flash;
 pub mod machine;
 pub mod replay;
 pub mod run;

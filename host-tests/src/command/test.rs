@@ -20,6 +20,7 @@ pub fn main() -> Result<ExitCode> {
         ("firmware builds without warnings", || {
             setup::mps2_with(Warnings::Denied)?;
             setup::counter(Warnings::Denied)?;
+            setup::nucleo(Warnings::Denied)?;
             setup::twin(TARGET, Warnings::Denied)?;
             setup::twin(TARGET_SOFT, Warnings::Denied).map(drop)
         }),
@@ -87,6 +88,8 @@ fn lints() -> Result<()> {
         "board-mps2",
         "-p",
         "board-mps2-twin",
+        "-p",
+        "board-nucleo-h743zi2",
         "--target",
         TARGET,
     ];

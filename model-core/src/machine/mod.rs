@@ -165,6 +165,8 @@ pub struct LoadCells {
     pub tare_n: f64,
     /// Time constant of the filter, s.
     pub filter_s: f64,
+    /// Web tension at which the amplifier's analogue output is at its end, N.
+    pub full_scale_n: f64,
 }
 
 /// A motor, referred to the shaft of its roll.
@@ -289,6 +291,8 @@ pub struct Machine {
     pub operation: Operation,
     /// Pulses of the rear drum's encoder for one revolution.
     pub encoder_pulses: f64,
+    /// Pulses of the unwind's encoder for one revolution.
+    pub encoder_pulses_uw: f64,
 }
 
 impl Machine {

@@ -347,6 +347,7 @@ static TABLE: &[&[Parameter]] = &[
         calibrated_wrap_rad "rad", 0.05..=PI, "wrap angle that the amplifier has been calibrated for β_cal";
         tare_n "N", -1e5..=1e5, "error of the zero";
         filter_s "s", 0.004..=10.0, "time constant of the filter";
+        full_scale_n "N", 1.0..=1e6, "web tension at which the amplifier's analogue output is at its end";
     }),
     driven_roll!(rear_drum),
     driven_roll!(front_drum),
@@ -439,6 +440,7 @@ static TABLE: &[&[Parameter]] = &[
     front_share!(7),
     part!(|m, i| () {
         encoder_pulses "", 1.0..=1e5, "pulses of the rear drum's encoder for one revolution";
+        encoder_pulses_uw "", 1.0..=1e5, "pulses of the unwind's encoder for one revolution";
     }),
 ];
 

@@ -97,6 +97,7 @@ impl Machine {
                 calibrated_wrap_rad: 1.0,
                 tare_n: 0.0,
                 filter_s: 0.05,
+                full_scale_n: 10e3,
             },
             last_span_m: 2.5,
             rear_drum: drum,
@@ -173,6 +174,7 @@ impl Machine {
                 rider_share: 0.05,
             },
             encoder_pulses: 4096.0,
+            encoder_pulses_uw: 1024.0,
         }
     }
 
@@ -296,6 +298,10 @@ impl Machine {
                 eccentricity_m: 0.0,
             },
             idle: Vec::from_iter([rolls(1.5), rolls(1.0)]),
+            load_cells: LoadCells {
+                full_scale_n: 300.0,
+                ..news.load_cells
+            },
             last_span_m: 0.8,
             rear_drum: drum,
             front_drum: drum,
@@ -356,7 +362,7 @@ impl Machine {
                 rider_share: 0.05,
             },
             encoder_pulses: 4096.0,
-            ..news
+            encoder_pulses_uw: 1024.0,
         }
     }
 }

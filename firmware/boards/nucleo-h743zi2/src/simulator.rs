@@ -1,0 +1,90 @@
+//! The simulator's tasks on this board: the library's, given their place.
+//!
+//! Does not compute anything and does not know the machine beyond its settings.
+
+use core::cell::RefCell;
+
+use embassy_executor::SendSpawner;
+use embassy_time::Instant;
+use firmware::journal::Journal;
+use firmware::link::ImageCell;
+use firmware::tasks::{self, Exchange};
+use firmware::{SPANS, Scalar};
+use model_core::drive::Drive;
+use model_core::image::{Commands, Feedback, Image};
+use model_core::logic::{Fault, Logic, Mode, Refusal};
+use model_core::machine::Machine;
+use model_core::simulator::Plant;
+use static_cell::StaticCell;
+
+use crate::net::LocalImage;
+use crate::wires::Wires;
+
+/// The timed tasks, each in its executor, from one common start.
+pub fn start(
+    [plant_at, drive_at]: [SendSpawner; 2],
+    start: Instant,
+    machine: &'static Machine,
+    wires: Wires,
+) -> &'static Exchange {
+    static EXCHANGE: StaticCell<Exchange> = StaticCell::new();
+    let exchange = &*EXCHANGE.init(Exchange::default());
+    plant_at.spawn(plant(start, machine, exchange).expect("first"));
+    // after the plant, which the same alarm wakes
+    plant_at.spawn(crate::wires::run(start, wires, exchange).expect("first"));
+    drive_at.spawn(drive(start, machine, exchange).expect("first"));
+    exchange
+}
+
+/// The process image at power-up.
+pub fn image(machine: &Machine) -> &'static LocalImage {
+    static IMAGE: StaticCell<LocalImage> = StaticCell::new();
+    IMAGE.init(ImageCell::new(RefCell::new(Image {
+        commands: Commands::of(machine),
+        feedback: Feedback::default(),
+    })))
+}
+
+/// The plant, every 4 ms.
+#[embassy_executor::task]
+async fn plant(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
+    match Plant::<Scalar, SPANS>::new(machine) {
+        Ok(mut plant) => tasks::plant(start, &mut plant, exchange).await,
+        Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
+    }
+}
+
+/// The regulators, every 10 ms.
+#[embassy_executor::task]
+async fn drive(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
+    tasks::drive(start, &mut Drive::new(machine), exchange).await;
+}
+
+/// The drive logic, in the background.
+#[embassy_executor::task]
+pub async fn logic(
+    machine: &'static Machine,
+    exchange: &'static Exchange,
+    image: &'static LocalImage,
+) {
+    tasks::logic(&mut Logic::new(machine), exchange, image, &mut Log).await;
+}
+
+/// The journal goes to the log.
+struct Log;
+
+impl Journal for Log {
+    fn command(&mut self, cycle: u32, word: u16, value: u16) {
+        defmt::debug!("command {=u32} {=u16} {=u16}", cycle, word, value);
+    }
+
+    fn state(&mut self, _: u32, mode: Mode, fault: Fault, refusal: Refusal) {
+        let (fault, refusal) = (fault.name(), refusal.name());
+        defmt::info!(
+            "{=str}; fault: {=str}; refused: {=str}",
+            mode.name(),
+            fault,
+            refusal
+        );
+    }
+}
