@@ -151,8 +151,8 @@ async fn all_else(
 ) {
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    let image = simulator::image(machine);
-    spawner.spawn(simulator::logic(machine, exchange, image).expect("first"));
+    let service = simulator::service(machine);
+    spawner.spawn(simulator::logic(machine, exchange, service.image).expect("first"));
     spawner.spawn(panel::run(panel, exchange).expect("first"));
-    net::start(spawner, ethernet, network, image);
+    net::start(spawner, ethernet, network, service);
 }

@@ -6,7 +6,8 @@
 use embassy_executor::Spawner;
 use embassy_net::tcp::TcpSocket;
 use embassy_net::{
-    Config, ConfigV4, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources, StaticConfigV4,
+    Config, ConfigV4, IpAddress, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources,
+    StaticConfigV4,
 };
 use embassy_stm32::eth::{self, Ethernet, GenericPhy, Sma};
 use embassy_stm32::peripherals::{
@@ -16,7 +17,8 @@ use embassy_stm32::rng::{self, Rng};
 use embassy_stm32::{Peri, bind_interrupts, uid};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::{Duration, with_timeout};
-use firmware::link::ImageCell;
+use firmware::link::Service;
+use firmware::link::control::{Peer, Protocol};
 use firmware::link::modbus::tcp::{End, Timeouts, session};
 use firmware::link::seats::Seats;
 use firmware::store::Network;
@@ -51,8 +53,8 @@ const CLOSING: Duration = Duration::from_secs(2);
 /// A DHCP server that has not answered by then is not there.
 const DHCP: Duration = Duration::from_secs(10);
 
-/// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
-pub type LocalImage = ImageCell<NoopRawMutex>;
+/// What the background's tasks share: they take turns, so a lock need not keep anything off.
+pub type LocalService = Service<'static, NoopRawMutex>;
 
 type Places = Seats<NoopRawMutex, MODBUS_CLIENTS>;
 
@@ -81,7 +83,7 @@ pub struct Resources {
 }
 
 /// Starts the network. Runs in the background, where everything of the network stays.
-pub fn start(spawner: Spawner, r: Resources, network: Network, image: &'static LocalImage) {
+pub fn start(spawner: Spawner, r: Resources, network: Network, service: LocalService) {
     static RESOURCES: StaticCell<StackResources<{ MODBUS_SOCKETS + OTHER_SOCKETS }>> =
         StaticCell::new();
     static PLACES: StaticCell<Places> = StaticCell::new();
@@ -114,7 +116,7 @@ pub fn start(spawner: Spawner, r: Resources, network: Network, image: &'static L
     }
     let places = &*PLACES.init(Places::new());
     for _ in 0..MODBUS_SOCKETS {
-        spawner.spawn(serve_modbus(stack, image, places).expect("as many tasks as sockets"));
+        spawner.spawn(serve_modbus(stack, service, places).expect("as many tasks as sockets"));
     }
 }
 
@@ -169,11 +171,7 @@ async fn fall_back(stack: Stack<'static>) {
 
 /// One client after the other.
 #[embassy_executor::task(pool_size = MODBUS_SOCKETS)]
-async fn serve_modbus(
-    stack: Stack<'static>,
-    image: &'static LocalImage,
-    places: &'static Places,
-) -> ! {
+async fn serve_modbus(stack: Stack<'static>, service: LocalService, places: &'static Places) -> ! {
     let mut rx = [0; BUFFER_BYTES];
     let mut tx = [0; BUFFER_BYTES];
     let timeouts = Timeouts::default();
@@ -184,11 +182,17 @@ async fn serve_modbus(
     socket.set_nagle_enabled(false);
     loop {
         if socket.accept(MODBUS_PORT).await.is_ok() {
-            let place = places.take();
-            let talk = session(&mut socket, image, &timeouts, || place.answered());
-            if place.hold(talk).await == Some(End::Closed) {
-                socket.close();
-                let _ = with_timeout(CLOSING, socket.flush()).await;
+            let peer = socket.remote_endpoint().map(|from| match from.addr {
+                IpAddress::Ipv4(address) => Peer::Ip(address),
+            });
+            let client = peer.and_then(|peer| service.enter(peer, Protocol::ModbusTcp));
+            if let Some(client) = client {
+                let place = places.take();
+                let talk = session(&mut socket, &client, &timeouts, || place.answered());
+                if place.hold(talk).await == Some(End::Closed) {
+                    socket.close();
+                    let _ = with_timeout(CLOSING, socket.flush()).await;
+                }
             }
         }
         // Whatever state it is in: the socket must be closed to listen again.

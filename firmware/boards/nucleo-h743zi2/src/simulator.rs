@@ -5,9 +5,11 @@
 use core::cell::RefCell;
 
 use embassy_executor::SendSpawner;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::journal::Journal;
-use firmware::link::ImageCell;
+use firmware::link::control::Control;
+use firmware::link::{ControlCell, ImageCell};
 use firmware::tasks::{self, Exchange};
 use firmware::{SPANS, Scalar};
 use model_core::drive::Drive;
@@ -17,7 +19,7 @@ use model_core::machine::Machine;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
-use crate::net::LocalImage;
+use crate::net::LocalService;
 use crate::wires::Wires;
 
 /// The timed tasks, each in its executor, from one common start.
@@ -36,13 +38,17 @@ pub fn start(
     exchange
 }
 
-/// The process image at power-up.
-pub fn image(machine: &Machine) -> &'static LocalImage {
-    static IMAGE: StaticCell<LocalImage> = StaticCell::new();
-    IMAGE.init(ImageCell::new(RefCell::new(Image {
-        commands: Commands::of(machine),
-        feedback: Feedback::default(),
-    })))
+/// What the links serve, at power-up.
+pub fn service(machine: &Machine) -> LocalService {
+    static IMAGE: StaticCell<ImageCell<NoopRawMutex>> = StaticCell::new();
+    static CONTROL: StaticCell<ControlCell<NoopRawMutex>> = StaticCell::new();
+    LocalService {
+        image: IMAGE.init(ImageCell::new(RefCell::new(Image {
+            commands: Commands::of(machine),
+            feedback: Feedback::default(),
+        }))),
+        control: CONTROL.init(ControlCell::new(RefCell::new(Control::default()))),
+    }
 }
 
 /// The plant, every 4 ms.
@@ -65,7 +71,7 @@ async fn drive(start: Instant, machine: &'static Machine, exchange: &'static Exc
 pub async fn logic(
     machine: &'static Machine,
     exchange: &'static Exchange,
-    image: &'static LocalImage,
+    image: &'static ImageCell<NoopRawMutex>,
 ) {
     tasks::logic(&mut Logic::new(machine), exchange, image, &mut Log).await;
 }
