@@ -127,14 +127,14 @@ impl NorFlash for Flash {
 }
 
 fn load(flash: &mut Flash) -> Content {
-    let mut store = Store::new(flash, 0..SIZE as u32).unwrap();
+    let mut store = Store::new(flash, 0..SIZE as u32).expect("two pages");
     block_on(store.load())
 }
 
 /// Saves as a simulator does: after having looked.
 fn save(flash: &mut Flash, settings: &Settings) -> Result<(), SaveError> {
     flash.steps = 0;
-    let mut store = Store::new(flash, 0..SIZE as u32).unwrap();
+    let mut store = Store::new(flash, 0..SIZE as u32).expect("two pages");
     block_on(store.load());
     block_on(store.save(settings))
 }
@@ -213,7 +213,6 @@ fn what_is_not_ours_is_kept_until_a_person_decides() {
     assert_eq!(block_on(store.save(&numbered(1))), Err(SaveError::Unusable));
     block_on(store.load());
     assert_eq!(block_on(store.save(&numbered(1))), Err(SaveError::Unusable));
-    drop(store);
     assert_eq!(foreign.bytes, before);
 
     let mut store = Store::new(&mut foreign, 0..SIZE as u32).unwrap();

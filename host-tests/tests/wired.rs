@@ -149,9 +149,9 @@ impl Wires {
 /// Winds a library scenario in lockstep; `see` is called after each tick of the plant.
 fn wind(text: &str, mut see: impl FnMut(&Measurements<f32>, &mut Wires)) -> (Wires, Image) {
     let path = format!("{}/scenarios/{text}.toml", env!("CARGO_MANIFEST_DIR"));
-    let scenario = Scenario::open(path.as_ref()).unwrap();
+    let scenario = Scenario::open(path.as_ref()).expect("of the library");
     let machine = &scenario.machine.machine;
-    let mut simulator = Simulator::<Scalar, SPANS>::new(machine).unwrap();
+    let mut simulator = Simulator::<Scalar, SPANS>::new(machine).expect("of the library");
     let mut image = Image {
         commands: Commands::of(machine),
         feedback: Feedback::default(),
