@@ -108,14 +108,14 @@ fn main() -> ! {
             uw: (p.TIM5, p.TIM8, p.PA0, p.PA3),
             dac: (p.DAC1, p.PA4),
             wired: p.PG14.into(),
-            switches: [p.PF13.into(), p.PF14.into(), p.PF15.into()],
+            switches: [p.PG12.into(), p.PF3.into(), p.PE14.into()],
             button,
             relays: [
                 p.PE9.into(),
                 p.PE11.into(),
                 p.PE13.into(),
-                p.PF12.into(),
                 p.PD15.into(),
+                p.PD14.into(),
             ],
         },
     );
