@@ -4,14 +4,18 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod journal;
 pub mod link;
 pub mod lockstep;
+pub mod mailbox;
 pub mod store;
 pub mod tasks;
 pub mod wired;
 
-/// The numbers the firmware computes with.
+/// The numbers that the simulator in one hand computes with; a board with tasks chooses its own.
 pub type Scalar = f32;
 /// Web spans of the machine the firmware is built for.
 pub const SPANS: usize = 3;

@@ -3,171 +3,235 @@
 //! Not here: executors, priorities, interrupts: those are the board's. It runs [`plant`] above [`drive`] above
 //! [`logic`], each in an executor of its own, from one common start.
 //!
-//! What one task hands to another goes through a [`Mailbox`]. The logic gets all it needs of a drive cycle in
-//! one piece and answers before the next; so it does not matter when in between it gets its turn, and the same
-//! commands in the same cycles give the same bits as [`model_core::simulator::Simulator`].
+//! What one task hands to another goes through a [`Mailbox`], and nothing here keeps an interrupt off. The logic gets
+//! all it needs of a drive cycle in one piece and answers before the next; so it does not matter when in between it
+//! gets its turn, and the same commands in the same cycles give the same bits as
+//! [`model_core::simulator::Simulator`].
 
-use core::cell::Cell;
+use core::future::poll_fn;
+use core::marker::PhantomData;
+use core::sync::atomic::{AtomicU32, Ordering};
+use core::task::Poll;
 
-use embassy_sync::blocking_mutex::Mutex;
-use embassy_sync::blocking_mutex::raw::{CriticalSectionRawMutex, RawMutex};
-use embassy_sync::signal::Signal;
+use atomic_waker::AtomicWaker;
+use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::{Duration, Instant, Timer};
 use model_core::drive::{DRIVE_PERIOD_MS, Drive};
 use model_core::exchange::{Actuators, DriveCommand, DriveStatus, Measurements};
 use model_core::image::{self, Feedback, Image};
 use model_core::logic::{Logic, command};
 use model_core::plant::PLANT_PERIOD_MS;
+use model_core::real::{Real, Scalar};
 use model_core::simulator::{Plant, Record, logic_tick};
 
 use crate::journal::{Journal, Observer};
 use crate::link::ImageCell;
+use crate::mailbox::Mailbox;
 use crate::wired::{Inputs, Outputs};
-use crate::{SPANS, Scalar};
 
-/// A value that one task leaves for another; the latest counts.
-struct Mailbox<T>(Mutex<CriticalSectionRawMutex, Cell<T>>);
+/// What a board measures times with: cycles of the core, or a timer as fast as there is.
+pub trait Stopwatch {
+    /// Its counts in a microsecond.
+    const PER_US: u32;
 
-impl<T: Copy> Mailbox<T> {
-    fn new(value: T) -> Self {
-        Self(Mutex::new(Cell::new(value)))
-    }
-    fn get(&self) -> T {
-        self.0.lock(Cell::get)
-    }
-    fn set(&self, value: T) {
-        self.0.lock(|cell| cell.set(value));
-    }
+    /// Its count, which wraps.
+    fn count() -> u32;
 }
 
 /// All that a drive cycle gives the logic.
-struct Cycle {
+#[derive(Clone, Copy)]
+struct Cycle<R> {
     number: u32,
-    measurements: Measurements<Scalar>,
-    status: DriveStatus<Scalar>,
+    /// When it was due.
+    due: Instant,
+    measurements: Measurements<R>,
+    status: DriveStatus<R>,
     record: Record,
 }
 
 /// What the tasks hand to each other.
-pub struct Exchange {
-    actuators: Mailbox<Actuators<Scalar>>,
-    measurements: Mailbox<(Measurements<Scalar>, Record)>,
-    command: Mailbox<DriveCommand<Scalar>>,
-    cycle: Signal<CriticalSectionRawMutex, Cycle>,
+pub struct Exchange<R> {
+    actuators: Mailbox<Actuators<R>>,
+    measurements: Mailbox<(Measurements<R>, Record)>,
+    command: Mailbox<DriveCommand<R>>,
+    cycle: Mailbox<Cycle<R>>,
+    /// Drive cycles so far; wraps.
+    cycles: AtomicU32,
+    next_cycle: AtomicWaker,
     inputs: Mailbox<Inputs>,
     outputs: Mailbox<Outputs>,
-    plant_times: Mailbox<Times>,
-    drive_times: Mailbox<Times>,
+    plant_times: Times,
+    drive_times: Times,
+    logic_times: Times,
 }
 
-impl Default for Exchange {
+impl<R: Real> Default for Exchange<R> {
     fn default() -> Self {
         Self {
             actuators: Mailbox::new(Actuators::default()),
             measurements: Mailbox::new((Measurements::default(), Record::default())),
             command: Mailbox::new(DriveCommand::default()),
-            cycle: Signal::new(),
+            cycle: Mailbox::new(Cycle {
+                number: 0,
+                due: Instant::MIN,
+                measurements: Measurements::default(),
+                status: DriveStatus::default(),
+                record: Record::default(),
+            }),
+            cycles: AtomicU32::new(0),
+            next_cycle: AtomicWaker::new(),
             inputs: Mailbox::new(Inputs::default()),
             outputs: Mailbox::new(Outputs::default()),
-            plant_times: Mailbox::new(Times::default()),
-            drive_times: Mailbox::new(Times::default()),
+            plant_times: Times::default(),
+            drive_times: Times::default(),
+            logic_times: Times::default(),
         }
     }
 }
 
-/// The worst of a timed task since it was last forgotten.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The times of a task: the last activation, and the worst since they were last forgotten.
+///
+/// The task writes them, and whoever forgets them is below it, so that nothing is counted half.
+#[derive(Debug, Default)]
 struct Times {
     /// Activations not done before the next was due.
-    overruns: u16,
-    /// Longest activation, µs, with what interrupted it.
-    longest_us: u16,
+    overruns: AtomicU32,
+    /// Last activation, in counts of the stopwatch, with what interrupted it.
+    last: AtomicU32,
+    /// Longest activation, likewise.
+    longest: AtomicU32,
     /// Latest start, µs after it was due.
-    latest_us: u16,
+    latest_us: AtomicU32,
+}
+
+impl Times {
+    fn activation(&self, counts: u32, late: Duration) {
+        let late_us = u32::try_from(late.as_micros()).unwrap_or(u32::MAX);
+        self.last.store(counts, Ordering::Relaxed);
+        raise(&self.longest, counts);
+        raise(&self.latest_us, late_us);
+    }
+
+    fn overrun(&self, times: u32) {
+        let overruns = self.overruns.load(Ordering::Relaxed);
+        self.overruns
+            .store(overruns.saturating_add(times), Ordering::Relaxed);
+    }
+
+    fn forget(&self) {
+        for worst in [&self.overruns, &self.longest, &self.latest_us] {
+            worst.store(0, Ordering::Relaxed);
+        }
+    }
+}
+
+/// What only one task writes can be compared and written in two steps.
+fn raise(worst: &AtomicU32, value: u32) {
+    if value > worst.load(Ordering::Relaxed) {
+        worst.store(value, Ordering::Relaxed);
+    }
 }
 
 /// The releases of a timed task: exact multiples of its period from the start, none skipped.
-struct Rate<'a> {
+struct Rate<'a, W> {
     due: Instant,
     period: Duration,
-    started: Instant,
-    times: &'a Mailbox<Times>,
+    late: Duration,
+    began: u32,
+    times: &'a Times,
+    stopwatch: PhantomData<W>,
 }
 
-impl<'a> Rate<'a> {
-    fn new(start: Instant, period_ms: u32, times: &'a Mailbox<Times>) -> Self {
+impl<'a, W: Stopwatch> Rate<'a, W> {
+    fn new(start: Instant, period_ms: u32, times: &'a Times) -> Self {
         Self {
             due: start,
             period: Duration::from_millis(u64::from(period_ms)),
-            started: start,
+            late: Duration::MIN,
+            began: 0,
             times,
+            stopwatch: PhantomData,
         }
     }
 
     async fn release(&mut self) {
         self.due += self.period;
         Timer::at(self.due).await;
-        self.started = Instant::now();
+        self.began = W::count();
+        self.late = Instant::now() - self.due;
     }
 
     fn done(&self) {
-        let now = Instant::now();
-        let us = |d: Duration| u16::try_from(d.as_micros()).unwrap_or(u16::MAX);
-        let mut times = self.times.get();
-        times.longest_us = times.longest_us.max(us(now - self.started));
-        times.latest_us = times.latest_us.max(us(self.started - self.due));
-        if now >= self.due + self.period {
-            times.overruns = times.overruns.saturating_add(1);
+        let counts = W::count().wrapping_sub(self.began);
+        self.times.activation(counts, self.late);
+        // Started late by a whole period or done that late: the next is due already.
+        let took = Duration::from_micros(u64::from(counts / W::PER_US));
+        if self.late + took >= self.period {
+            self.times.overrun(1);
         }
-        self.times.set(times);
     }
 }
 
 /// The plant's task: the winder moves by 4 ms.
-pub async fn plant(start: Instant, plant: &mut Plant<Scalar, SPANS>, exchange: &Exchange) -> ! {
-    let mut rate = Rate::new(start, PLANT_PERIOD_MS, &exchange.plant_times);
+pub async fn plant<W: Stopwatch, R: Scalar, const SPANS: usize>(
+    start: Instant,
+    plant: &mut Plant<R, SPANS>,
+    exchange: &Exchange<R::Si>,
+) -> ! {
+    let mut rate = Rate::<W>::new(start, PLANT_PERIOD_MS, &exchange.plant_times);
     loop {
         rate.release().await;
-        let seen = plant.tick(&exchange.actuators.get());
+        let seen = exchange.actuators.look(|actuators| plant.tick(actuators));
         exchange.measurements.set(seen);
         rate.done();
     }
 }
 
 /// The regulators' task: torques from what can be measured.
-pub async fn drive(start: Instant, drive: &mut Drive<Scalar>, exchange: &Exchange) -> ! {
-    let mut rate = Rate::new(start, DRIVE_PERIOD_MS, &exchange.drive_times);
-    let mut number = 0;
+pub async fn drive<W: Stopwatch, R: Real>(
+    start: Instant,
+    drive: &mut Drive<R>,
+    exchange: &Exchange<R>,
+) -> ! {
+    let mut rate = Rate::<W>::new(start, DRIVE_PERIOD_MS, &exchange.drive_times);
+    let mut number = 0_u32;
     loop {
         rate.release().await;
         let (measurements, record) = exchange.measurements.get();
-        let (actuators, status) = drive.step(&exchange.command.get(), &measurements);
+        let command = &exchange.command;
+        let (actuators, status) = command.look(|command| drive.step(command, &measurements));
         exchange.actuators.set(actuators);
-        exchange.cycle.signal(Cycle {
+        exchange.cycle.set(Cycle {
             number,
+            due: rate.due,
             measurements,
             status,
             record,
         });
         number = number.wrapping_add(1);
+        exchange.cycles.store(number, Ordering::Release);
+        exchange.next_cycle.wake();
         rate.done();
     }
 }
 
 /// The logic's task: modes, interlocks and the process image, once a drive cycle.
-pub async fn logic<M: RawMutex>(
-    logic: &mut Logic<Scalar>,
-    exchange: &Exchange,
+pub async fn logic<W: Stopwatch, R: Real, M: RawMutex>(
+    logic: &mut Logic<R>,
+    exchange: &Exchange<R>,
     image: &ImageCell<M>,
     journal: &mut impl Journal,
 ) -> ! {
     let mut observer = Observer::new(image.lock(|image| image.borrow().commands));
-    let (mut next, mut missed) = (0, 0_u16);
+    let times = &exchange.logic_times;
+    let mut next = 0;
     let mut reset = Edge::default();
     loop {
-        let cycle = exchange.cycle.wait().await;
-        let behind = cycle.number.wrapping_sub(next);
-        missed = missed.saturating_add(u16::try_from(behind).unwrap_or(u16::MAX));
+        exchange.cycle_from(next).await;
+        let began = W::count();
+        let cycle = exchange.cycle.get();
+        let late = Instant::now() - cycle.due;
+        times.overrun(cycle.number.wrapping_sub(next));
         next = cycle.number.wrapping_add(1);
 
         let snapshot = image.lock(|image| {
@@ -182,23 +246,22 @@ pub async fn logic<M: RawMutex>(
                 &mut image.feedback,
             );
             exchange.command.set(command);
-            exchange.report_times(missed, &mut image.feedback);
+            exchange.report_times::<W>(&mut image.feedback);
             exchange.outputs.set(Outputs::of(&image.feedback));
             Image { commands, ..*image }
         });
         observer.look(cycle.number, &snapshot, journal);
+        times.activation(W::count().wrapping_sub(began), late);
         let word = snapshot.commands.word(&image::WINDER_COMMAND);
         if reset.rises(word & command::RESET_TIMES != 0) {
-            missed = 0;
-            exchange.plant_times.set(Times::default());
-            exchange.drive_times.set(Times::default());
+            exchange.forget_times();
         }
     }
 }
 
-impl Exchange {
+impl<R: Real> Exchange<R> {
     /// What can be measured since the plant's last activation.
-    pub fn measurements(&self) -> Measurements<Scalar> {
+    pub fn measurements(&self) -> Measurements<R> {
         self.measurements.get().0
     }
 
@@ -212,18 +275,39 @@ impl Exchange {
         self.inputs.set(inputs);
     }
 
-    fn report_times(&self, logic_overruns: u16, feedback: &mut Feedback) {
-        let (plant, drive) = (self.plant_times.get(), self.drive_times.get());
+    /// Waits for a drive cycle of this number or a later one.
+    async fn cycle_from(&self, number: u32) {
+        poll_fn(|context| {
+            self.next_cycle.register(context.waker());
+            if self.cycles.load(Ordering::Acquire) == number {
+                Poll::Pending
+            } else {
+                Poll::Ready(())
+            }
+        })
+        .await;
+    }
+
+    fn forget_times(&self) {
+        for times in [&self.plant_times, &self.drive_times, &self.logic_times] {
+            times.forget();
+        }
+    }
+
+    fn report_times<W: Stopwatch>(&self, feedback: &mut Feedback) {
+        let (plant, drive, logic) = (&self.plant_times, &self.drive_times, &self.logic_times);
+        let us = |counts: &AtomicU32| counts.load(Ordering::Relaxed) / W::PER_US;
+        let plain = |number: &AtomicU32| number.load(Ordering::Relaxed);
         for (signal, value) in [
-            (&image::PLANT_OVERRUNS, plant.overruns),
-            (&image::PLANT_TIME_MAX, plant.longest_us),
-            (&image::PLANT_JITTER_MAX, plant.latest_us),
-            (&image::DRIVE_OVERRUNS, drive.overruns),
-            (&image::DRIVE_TIME_MAX, drive.longest_us),
-            (&image::DRIVE_JITTER_MAX, drive.latest_us),
-            (&image::LOGIC_OVERRUNS, logic_overruns),
+            (&image::PLANT_OVERRUNS, plain(&plant.overruns)),
+            (&image::PLANT_TIME_MAX, us(&plant.longest)),
+            (&image::PLANT_JITTER_MAX, plain(&plant.latest_us)),
+            (&image::DRIVE_OVERRUNS, plain(&drive.overruns)),
+            (&image::DRIVE_TIME_MAX, us(&drive.longest)),
+            (&image::DRIVE_JITTER_MAX, plain(&drive.latest_us)),
+            (&image::LOGIC_OVERRUNS, plain(&logic.overruns)),
         ] {
-            feedback.set_word(signal, value);
+            feedback.set_word(signal, u16::try_from(value).unwrap_or(u16::MAX));
         }
     }
 }

@@ -22,4 +22,5 @@ pub mod scenario;
 pub mod setup;
 pub mod signals;
 pub mod simulator;
+pub mod timing;
 pub mod twin;

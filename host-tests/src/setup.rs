@@ -60,6 +60,17 @@ pub fn mps2_with(warnings: Warnings) -> Result<Mps2> {
     })
 }
 
+/// The firmware of the board `mps2` for a target: an ELF file, built where it is not up to date.
+pub fn mps2_for(target: &str, warnings: Warnings) -> Result<PathBuf> {
+    self::target(target)?;
+    firmware(
+        "board-mps2",
+        &format!("the firmware for {target}"),
+        target,
+        warnings,
+    )
+}
+
 /// The model alone for a target: an ELF file, built where it is not up to date.
 pub fn twin(target: &str, warnings: Warnings) -> Result<PathBuf> {
     self::target(target)?;
@@ -99,6 +110,27 @@ pub fn counter(warnings: Warnings) -> Result<PathBuf> {
         warnings,
     )?;
     built(&["release", "libqemu_count.so"])
+}
+
+/// The QEMU plugin that sees which task runs, built where it is not up to date.
+pub fn tracer(warnings: Warnings) -> Result<PathBuf> {
+    let package = ["build", "--release", "-p", "qemu-trace"];
+    build(
+        "the QEMU plugin that sees which task runs",
+        &package,
+        warnings,
+    )?;
+    built(&["release", "libqemu_trace.so"])
+}
+
+/// The compiler, as it tells its version.
+pub fn compiler() -> Result<String> {
+    let output = Command::new("rustc")
+        .arg("-V")
+        .current_dir(root())
+        .output()
+        .context("cannot start rustc")?;
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
 /// The model alone on this PC as a development build makes it: a program, built where it is not up to date.

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use host_tests::command::{
-    bench, demo, figures, flash, machine, replay, run, scenario, signals, test,
+    bench, demo, figures, flash, machine, replay, run, scenario, signals, size, test, timing,
 };
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
@@ -47,6 +47,12 @@ enum Command {
     ///
     /// Builds it; says what is missing when probe-rs or the board is not there.
     Flash(flash::Args),
+    /// Measure the firmware's tasks in QEMU on three cores under several loads, the same in every run
+    ///
+    /// Installs and builds what is missing. Exit status 1: a bar was missed, or something is not as kept.
+    Timing(timing::Args),
+    /// Print what the firmware takes of the memories, and compare it with what is kept
+    Size(size::Args),
     /// Run the winder alone, open loop, from a schedule of torques
     Plant(plant::Options),
     /// Print a machine as a file: every parameter with its unit, limits and description
@@ -87,6 +93,8 @@ fn run(cli: Cli) -> Result<ExitCode> {
         Command::Run(args) => interrupt::install().and_then(|()| run::main(args)),
         Command::Bench(args) => interrupt::install().and_then(|()| bench::main(&args)),
         Command::Flash(args) => interrupt::install().and_then(|()| flash::main(&args)),
+        Command::Timing(args) => interrupt::install().and_then(|()| timing::main(&args)),
+        Command::Size(args) => interrupt::install().and_then(|()| size::main(args)),
         Command::Test => interrupt::install().and_then(|()| test::main()),
     }
 }

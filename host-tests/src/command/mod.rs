@@ -9,4 +9,6 @@ pub mod replay;
 pub mod run;
 pub mod scenario;
 pub mod signals;
+pub mod size;
 pub mod test;
+pub mod timing;

@@ -13,7 +13,7 @@ type Stage = (&'static str, fn() -> Result<()>);
 
 /// Installs what is missing and runs every test there is.
 pub fn main() -> Result<ExitCode> {
-    let stages: [Stage; 5] = [
+    let stages: [Stage; 6] = [
         ("formatting", || cargo(&["fmt", "--all", "--check"])),
         ("lints", lints),
         ("host tests", || cargo(&["test"])),
@@ -21,6 +21,8 @@ pub fn main() -> Result<ExitCode> {
             setup::mps2_with(Warnings::Denied)?;
             setup::counter(Warnings::Denied)?;
             setup::nucleo(Warnings::Denied)?;
+            setup::tracer(Warnings::Denied)?;
+            setup::mps2_for(TARGET_SOFT, Warnings::Denied)?;
             setup::twin(TARGET, Warnings::Denied)?;
             setup::twin(TARGET_SOFT, Warnings::Denied).map(drop)
         }),
@@ -37,6 +39,10 @@ pub fn main() -> Result<ExitCode> {
                 "--test",
                 "twin",
             ])
+        }),
+        ("timing and sizes", || {
+            super::timing::check()?;
+            super::size::check()
         }),
     ];
     // what needs the network first: better no start than a late stop
@@ -101,6 +107,8 @@ fn lints() -> Result<()> {
         "qemu-pace",
         "-p",
         "qemu-count",
+        "-p",
+        "qemu-trace",
         "-p",
         "qemu-plugin",
         "--",

@@ -6,9 +6,9 @@
 //!
 //! The plant preempts the drive, the drive preempts the background, and that is all there is:
 //!
-//! - The time driver's alarm has the plant's priority. It would interrupt the plant only to wake
-//!   tasks that have to wait for the plant anyway. Both pending, the lower number goes first, so
-//!   the alarm that is due delays the plant by its own few instructions and nothing else does.
+//! - An alarm has the priority of the tasks that it wakes, which have to wait for each other
+//!   anyway. Both pending, the lower number goes first, so the plant's alarm delays the plant by
+//!   its own few instructions, and nothing else does.
 //! - The Ethernet has the background's priority. All it does is wake the network's task, which
 //!   runs there: it never disturbs a timed task, and it never meets the driver half-way.
 //!
@@ -24,8 +24,12 @@ use cortex_m::peripheral::NVIC;
 #[derive(Clone, Copy)]
 #[repr(u16)]
 pub enum Interrupt {
-    /// One-shot alarm of the time driver.
-    Timer0 = 8,
+    /// TIMER0: alarm of the plant.
+    AlarmPlant = 8,
+    /// TIMER1: alarm of the drive.
+    AlarmDrive = 9,
+    /// Dual timer: alarm of the background.
+    AlarmBackground = 10,
     /// LAN9118.
     Ethernet = 13,
     /// No device's: runs the plant's executor.
@@ -47,17 +51,25 @@ impl Interrupt {
     /// The lower, the more urgent.
     const fn priority(self) -> u8 {
         match self {
-            Self::Timer0 | Self::Plant => 0x10,
-            Self::Drive => 0x20,
-            Self::Ethernet | Self::Background => 0x30,
+            Self::AlarmPlant | Self::Plant => 0x10,
+            Self::AlarmDrive | Self::Drive => 0x20,
+            Self::AlarmBackground | Self::Ethernet | Self::Background => 0x30,
         }
     }
 }
 
 /// Gives every interrupt its priority; enables none.
 pub fn set_priorities(nvic: &mut NVIC) {
-    use Interrupt::{Background, Drive, Ethernet, Plant, Timer0};
-    for interrupt in [Timer0, Ethernet, Plant, Drive, Background] {
+    use Interrupt::{AlarmBackground, AlarmDrive, AlarmPlant, Background, Drive, Ethernet, Plant};
+    for interrupt in [
+        AlarmPlant,
+        AlarmDrive,
+        AlarmBackground,
+        Ethernet,
+        Plant,
+        Drive,
+        Background,
+    ] {
         // SAFETY: no critical section of this firmware is based on priorities.
         unsafe { nvic.set_priority(interrupt, interrupt.priority()) };
     }
@@ -80,7 +92,9 @@ unsafe extern "C" {
 #[unsafe(no_mangle)]
 static __INTERRUPTS: [Vector; 32] = {
     let mut table: [Vector; 32] = [DefaultHandler; 32];
-    table[Interrupt::Timer0 as usize] = crate::time_driver::on_alarm;
+    table[Interrupt::AlarmPlant as usize] = crate::time_driver::on_alarm_plant;
+    table[Interrupt::AlarmDrive as usize] = crate::time_driver::on_alarm_drive;
+    table[Interrupt::AlarmBackground as usize] = crate::time_driver::on_alarm_background;
     table[Interrupt::Ethernet as usize] = crate::lan9118::on_interrupt;
     table[Interrupt::Plant as usize] = crate::on_plant;
     table[Interrupt::Drive as usize] = crate::on_drive;

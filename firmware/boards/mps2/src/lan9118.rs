@@ -16,11 +16,12 @@
 
 use core::task::Context;
 
+use atomic_waker::AtomicWaker;
 use embassy_net_driver::{Capabilities, HardwareAddress, LinkState};
-use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::{Duration, Instant};
 
 use crate::interrupts::{self, Interrupt};
+use crate::trace;
 
 /// Locally administered; there is one simulator on QEMU's private network.
 const ADDRESS: [u8; 6] = [0x02, 0x00, 0x00, 0x00, 0x05, 0x00];
@@ -38,30 +39,36 @@ const BUFFER_BYTES: usize = (FRAME_BYTES + FCS_BYTES).next_multiple_of(4);
 /// Where the chip is, and its registers.
 mod chip {
     #![allow(unsafe_code)] // The addresses are those of the data sheet.
+    use core::sync::atomic::{AtomicUsize, Ordering};
+
     use crate::register::Register;
 
-    /// Arm AN500; on AN385 and AN386 it is 0x4020_0000.
-    const BASE: usize = 0xa000_0000;
+    /// A chip that is there.
+    #[derive(Clone, Copy)]
+    pub struct Chip {
+        base: usize,
+    }
 
-    // SAFETY (all): registers of the LAN9118, which is no bus master.
-    pub const RX_DATA_FIFO: Register = unsafe { Register::at(BASE) };
-    pub const TX_DATA_FIFO: Register = unsafe { Register::at(BASE + 0x20) };
-    pub const RX_STATUS_FIFO: Register = unsafe { Register::at(BASE + 0x40) };
-    pub const TX_STATUS_FIFO: Register = unsafe { Register::at(BASE + 0x48) };
-    pub const IRQ_CFG: Register = unsafe { Register::at(BASE + 0x54) };
-    pub const INT_STS: Register = unsafe { Register::at(BASE + 0x58) };
-    pub const INT_EN: Register = unsafe { Register::at(BASE + 0x5c) };
-    pub const BYTE_TEST: Register = unsafe { Register::at(BASE + 0x64) };
-    pub const FIFO_INT: Register = unsafe { Register::at(BASE + 0x68) };
-    pub const TX_CFG: Register = unsafe { Register::at(BASE + 0x70) };
-    pub const HW_CFG: Register = unsafe { Register::at(BASE + 0x74) };
-    pub const RX_FIFO_INF: Register = unsafe { Register::at(BASE + 0x7c) };
-    pub const TX_FIFO_INF: Register = unsafe { Register::at(BASE + 0x80) };
-    const MAC_CSR_CMD: Register = unsafe { Register::at(BASE + 0xa4) };
-    const MAC_CSR_DATA: Register = unsafe { Register::at(BASE + 0xa8) };
+    /// A register of the chip, by its offset.
+    #[derive(Clone, Copy)]
+    pub struct At(usize);
 
-    /// What BYTE_TEST reads, for any chip of the family.
-    pub const BYTE_ORDER: u32 = 0x8765_4321;
+    pub const RX_DATA_FIFO: At = At(0);
+    pub const TX_DATA_FIFO: At = At(0x20);
+    pub const RX_STATUS_FIFO: At = At(0x40);
+    pub const TX_STATUS_FIFO: At = At(0x48);
+    pub const IRQ_CFG: At = At(0x54);
+    pub const INT_STS: At = At(0x58);
+    pub const INT_EN: At = At(0x5c);
+    const BYTE_TEST: At = At(0x64);
+    pub const FIFO_INT: At = At(0x68);
+    pub const TX_CFG: At = At(0x70);
+    pub const HW_CFG: At = At(0x74);
+    const RX_FIFO_INF: At = At(0x7c);
+    const TX_FIFO_INF: At = At(0x80);
+    const MAC_CSR_CMD: At = At(0xa4);
+    const MAC_CSR_DATA: At = At(0xa8);
+
     /// IRQ_CFG: IRQ_EN, and the pin driven actively and high, as the NVIC needs it.
     pub const IRQ_ACTIVE_HIGH: u32 = 1 << 8 | 1 << 4 | 1 << 0;
     /// INT_STS, INT_EN: RX status FIFO above the level of FIFO_INT, which is zero.
@@ -84,25 +91,85 @@ mod chip {
     /// MAC_CR: full duplex, transmitter and receiver on.
     pub const FDPX_TXEN_RXEN: u32 = 1 << 20 | 1 << 3 | 1 << 2;
 
-    pub fn write_mac(register: u32, value: u32) {
-        const BUSY: u32 = 1 << 31;
-        MAC_CSR_DATA.write(value);
-        MAC_CSR_CMD.write(BUSY | register);
-        while MAC_CSR_CMD.read() & BUSY != 0 {}
-    }
+    /// SCC_ID: part number of the image in the board's FPGA (Arm DUI 0546, CFG_REG for AN500, AN385, AN386).
+    // SAFETY: a register of the board's configuration controller, which accesses no memory.
+    const SCC_ID: Register = unsafe { Register::at(0x4002_fffc) };
+    const PART: u32 = 0xfff << 4;
+    const PART_AN500: u32 = 0x500 << 4;
+    /// Where the image of a Cortex-M7 has the chip, and where those of Cortex-M3 and M4 have it.
+    const BASE_AN500: usize = 0xa000_0000;
+    const BASE: usize = 0x4020_0000;
 
-    /// Frames waiting in the receive FIFO.
-    pub fn received() -> u32 {
-        RX_FIFO_INF.read() >> 16 & 0xff
+    /// Where the chip is that was found, for the interrupt handler.
+    static FOUND: AtomicUsize = AtomicUsize::new(0);
+
+    impl Chip {
+        /// The chip of this board, if one answers.
+        pub fn find() -> Option<Self> {
+            /// What BYTE_TEST reads, for any chip of the family.
+            const BYTE_ORDER: u32 = 0x8765_4321;
+            let base = match SCC_ID.read() & PART {
+                PART_AN500 => BASE_AN500,
+                _ => BASE,
+            };
+            let chip = Self { base };
+            let answers = chip.read(BYTE_TEST) == BYTE_ORDER;
+            answers.then(|| {
+                FOUND.store(base, Ordering::Relaxed);
+                chip
+            })
+        }
+
+        /// The chip that was found before.
+        pub fn started() -> Option<Self> {
+            let base = FOUND.load(Ordering::Relaxed);
+            (base != 0).then_some(Self { base })
+        }
+
+        fn register(self, at: At) -> Register {
+            // SAFETY: registers of the LAN9118, which is no bus master.
+            unsafe { Register::at(self.base + at.0) }
+        }
+
+        pub fn read(self, at: At) -> u32 {
+            self.register(at).read()
+        }
+
+        pub fn write(self, at: At, value: u32) {
+            self.register(at).write(value);
+        }
+
+        pub fn write_mac(self, register: u32, value: u32) {
+            const BUSY: u32 = 1 << 31;
+            self.write(MAC_CSR_DATA, value);
+            self.write(MAC_CSR_CMD, BUSY | register);
+            while self.read(MAC_CSR_CMD) & BUSY != 0 {}
+        }
+
+        /// Frames waiting in the receive FIFO.
+        pub fn received(self) -> u32 {
+            self.read(RX_FIFO_INF) >> 16 & 0xff
+        }
+
+        /// Statuses of sent frames that nobody has collected.
+        pub fn sent(self) -> u32 {
+            self.read(TX_FIFO_INF) >> 16 & 0xff
+        }
     }
 }
+
+use chip::Chip;
 
 static FRAME_RECEIVED: AtomicWaker = AtomicWaker::new();
 
 /// The interrupt handler: masks the interrupt and has the driver look.
 pub extern "C" fn on_interrupt() {
-    chip::INT_EN.write(0);
-    FRAME_RECEIVED.wake();
+    trace::handler(on_interrupt, || {
+        if let Some(chip) = Chip::started() {
+            chip.write(chip::INT_EN, 0);
+        }
+        FRAME_RECEIVED.wake();
+    });
 }
 
 /// No chip answers at the address.
@@ -111,6 +178,7 @@ pub struct NotFound;
 
 /// The chip, set up. There is only one; it answers to one task.
 pub struct Lan9118 {
+    chip: Chip,
     rx: [u8; BUFFER_BYTES],
     tx: [u8; BUFFER_BYTES],
     /// Frames received since `window`, when the window opened.
@@ -124,24 +192,23 @@ impl Lan9118 {
     /// # Errors
     /// [`NotFound`]: QEMU was started with another machine.
     pub fn start() -> Result<Self, NotFound> {
-        if chip::BYTE_TEST.read() != chip::BYTE_ORDER {
-            return Err(NotFound);
-        }
-        chip::HW_CFG.write(chip::SRST);
-        while chip::HW_CFG.read() & chip::SRST != 0 {}
-        chip::HW_CFG.write(chip::SF_TX_FIF_SZ);
-        chip::FIFO_INT.write(0);
+        let chip = Chip::find().ok_or(NotFound)?;
+        chip.write(chip::HW_CFG, chip::SRST);
+        while chip.read(chip::HW_CFG) & chip::SRST != 0 {}
+        chip.write(chip::HW_CFG, chip::SF_TX_FIF_SZ);
+        chip.write(chip::FIFO_INT, 0);
 
         let [a, b, c, d, e, f] = ADDRESS;
-        chip::write_mac(chip::ADDRL, u32::from_le_bytes([a, b, c, d]));
-        chip::write_mac(chip::ADDRH, u32::from_le_bytes([e, f, 0, 0]));
-        chip::write_mac(chip::MAC_CR, chip::FDPX_TXEN_RXEN);
-        chip::TX_CFG.write(chip::TX_ON);
+        chip.write_mac(chip::ADDRL, u32::from_le_bytes([a, b, c, d]));
+        chip.write_mac(chip::ADDRH, u32::from_le_bytes([e, f, 0, 0]));
+        chip.write_mac(chip::MAC_CR, chip::FDPX_TXEN_RXEN);
+        chip.write(chip::TX_CFG, chip::TX_ON);
 
         // The pin is low-active after reset: unmasked before this it would never rest.
-        chip::IRQ_CFG.write(chip::IRQ_ACTIVE_HIGH);
+        chip.write(chip::IRQ_CFG, chip::IRQ_ACTIVE_HIGH);
         interrupts::enable(Interrupt::Ethernet);
         Ok(Self {
+            chip,
             rx: [0; BUFFER_BYTES],
             tx: [0; BUFFER_BYTES],
             burst: 0,
@@ -163,12 +230,12 @@ impl embassy_net_driver::Driver for Lan9118 {
             }
             self.burst = 0;
         }
-        if chip::received() == 0 {
+        if self.chip.received() == 0 {
             FRAME_RECEIVED.register(cx.waker());
-            chip::INT_STS.write(chip::RSFL);
-            chip::INT_EN.write(chip::RSFL);
+            self.chip.write(chip::INT_STS, chip::RSFL);
+            self.chip.write(chip::INT_EN, chip::RSFL);
             // A frame that came before its interrupt was cleared would else wait for the next.
-            if chip::received() == 0 {
+            if self.chip.received() == 0 {
                 return None;
             }
         }
@@ -176,11 +243,14 @@ impl embassy_net_driver::Driver for Lan9118 {
             self.window = Instant::now();
         }
         self.burst += 1;
-        Some((RxToken(&mut self.rx), TxToken(&mut self.tx)))
+        Some((
+            RxToken(self.chip, &mut self.rx),
+            TxToken(self.chip, &mut self.tx),
+        ))
     }
 
     fn transmit(&mut self, _: &mut Context) -> Option<TxToken<'_>> {
-        Some(TxToken(&mut self.tx))
+        Some(TxToken(self.chip, &mut self.tx))
     }
 
     fn link_state(&mut self, _: &mut Context) -> LinkState {
@@ -201,18 +271,19 @@ impl embassy_net_driver::Driver for Lan9118 {
 }
 
 /// A frame in the receive FIFO, and where to read it to.
-pub struct RxToken<'a>(&'a mut [u8; BUFFER_BYTES]);
+pub struct RxToken<'a>(Chip, &'a mut [u8; BUFFER_BYTES]);
 
 impl embassy_net_driver::RxToken for RxToken<'_> {
     /// Always takes the whole frame out of the FIFO; one that is damaged or too long is passed on
     /// as empty, which no protocol takes for its own.
     fn consume<R, F: FnOnce(&mut [u8]) -> R>(self, f: F) -> R {
-        let status = chip::RX_STATUS_FIFO.read();
+        let Self(chip, buffer) = self;
+        let status = chip.read(chip::RX_STATUS_FIFO);
         let length = (status >> 16 & 0x3fff) as usize;
-        let (words, _) = self.0.as_chunks_mut();
+        let (words, _) = buffer.as_chunks_mut();
         let mut words = words.iter_mut();
         for _ in 0..length.div_ceil(4) {
-            let word = chip::RX_DATA_FIFO.read();
+            let word = chip.read(chip::RX_DATA_FIFO);
             if let Some(place) = words.next() {
                 *place = word.to_le_bytes();
             }
@@ -223,25 +294,26 @@ impl embassy_net_driver::RxToken for RxToken<'_> {
         } else {
             0
         };
-        f(&mut self.0[..frame])
+        f(&mut buffer[..frame])
     }
 }
 
 /// Where to put a frame to be sent.
-pub struct TxToken<'a>(&'a mut [u8; BUFFER_BYTES]);
+pub struct TxToken<'a>(Chip, &'a mut [u8; BUFFER_BYTES]);
 
 impl embassy_net_driver::TxToken for TxToken<'_> {
     fn consume<R, F: FnOnce(&mut [u8]) -> R>(self, length: usize, f: F) -> R {
-        let result = f(&mut self.0[..length]);
-        let (words, _) = self.0.as_chunks();
-        chip::TX_DATA_FIFO.write(chip::WHOLE_FRAME | length as u32);
-        chip::TX_DATA_FIFO.write(length as u32);
+        let Self(chip, buffer) = self;
+        let result = f(&mut buffer[..length]);
+        let (words, _) = buffer.as_chunks();
+        chip.write(chip::TX_DATA_FIFO, chip::WHOLE_FRAME | length as u32);
+        chip.write(chip::TX_DATA_FIFO, length as u32);
         for &word in &words[..length.div_ceil(4)] {
-            chip::TX_DATA_FIFO.write(u32::from_le_bytes(word));
+            chip.write(chip::TX_DATA_FIFO, u32::from_le_bytes(word));
         }
         // The chip stops sending when its statuses are not collected.
-        while chip::TX_FIFO_INF.read() >> 16 & 0xff != 0 {
-            chip::TX_STATUS_FIFO.read();
+        while chip.sent() != 0 {
+            chip.read(chip::TX_STATUS_FIFO);
         }
         result
     }

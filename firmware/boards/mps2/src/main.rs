@@ -1,4 +1,5 @@
-//! The paper winder simulator on QEMU's `mps2-an500`, a Cortex-M7 with Ethernet, for any PC.
+//! The paper winder simulator on QEMU's `mps2` boards, for any PC: `an500`, a Cortex-M7, `an386`, a Cortex-M4F, and
+//! `an385`, a Cortex-M3, each with Ethernet.
 //!
 //! Does not compute anything: the tasks are the library's. This crate starts the machine and
 //! gives the tasks their priorities, their clock and their network.
@@ -17,7 +18,9 @@ mod net;
 mod pace;
 mod register;
 mod simulator;
+mod stopwatch;
 mod time_driver;
+mod trace;
 mod uart_log;
 
 use embassy_executor::InterruptExecutor;
@@ -55,11 +58,13 @@ fn main() -> ! {
     uart_log::start();
     interrupts::set_priorities(&mut core.NVIC);
     time_driver::start();
+    stopwatch::start();
 
     // Before any task runs, so that nothing preempts it: this is as good as the background.
     defmt::info!(
-        "paper winder simulator {=str} on mps2-an500",
-        env!("CARGO_PKG_VERSION")
+        "paper winder simulator {=str} on mps2, computing in {=str}",
+        env!("CARGO_PKG_VERSION"),
+        simulator::SCALAR
     );
 
     let start = Instant::now() + SETTLING;

@@ -10,22 +10,42 @@ use core::cell::RefCell;
 use embassy_executor::Spawner;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
+use firmware::SPANS;
 use firmware::journal::Journal;
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
-use firmware::tasks::{self, Exchange};
-use firmware::{SPANS, Scalar};
+use firmware::tasks;
 use model_core::drive::Drive;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::logic::{Fault, Logic, Mode, Refusal};
 use model_core::machine::Machine;
+use model_core::real;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
 use crate::net::LocalService;
+use crate::trace::Traced;
 
 /// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
 type LocalImage = ImageCell<NoopRawMutex>;
+
+/// What the simulator computes with: floating point on a core that has it.
+#[cfg(target_abi = "eabihf")]
+pub type Scalar = f32;
+/// What the simulator computes with: fixed point on a core without floating-point unit.
+#[cfg(not(target_abi = "eabihf"))]
+pub type Scalar = model_core::fixed::Word;
+
+/// Its name.
+pub const SCALAR: &str = if cfg!(target_abi = "eabihf") {
+    "f32"
+} else {
+    "fixed point"
+};
+
+/// Everything around the plant computes in SI.
+type Si = <Scalar as real::Scalar>::Si;
+type Exchange = tasks::Exchange<Si>;
 
 /// What the tasks share, made once.
 pub fn exchange() -> &'static Exchange {
@@ -41,7 +61,7 @@ fn machine() -> Machine {
 #[embassy_executor::task]
 pub async fn plant(start: Instant, exchange: &'static Exchange) {
     match Plant::<Scalar, SPANS>::new(&machine()) {
-        Ok(mut plant) => tasks::plant(start, &mut plant, exchange).await,
+        Ok(mut plant) => tasks::plant::<Traced, _, _>(start, &mut plant, exchange).await,
         Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
     }
 }
@@ -49,7 +69,7 @@ pub async fn plant(start: Instant, exchange: &'static Exchange) {
 /// The regulators, every 10 ms.
 #[embassy_executor::task]
 pub async fn drive(start: Instant, exchange: &'static Exchange) {
-    tasks::drive(start, &mut Drive::new(&machine()), exchange).await;
+    tasks::drive::<Traced, _>(start, &mut Drive::new(&machine()), exchange).await;
 }
 
 /// Everything that may wait: logic, network, and the beat for the pace.
@@ -73,7 +93,7 @@ pub async fn background(exchange: &'static Exchange) {
 #[embassy_executor::task]
 async fn logic(exchange: &'static Exchange, image: &'static LocalImage) {
     let mut logic = Logic::new(&machine());
-    tasks::logic(&mut logic, exchange, image, &mut Log).await;
+    tasks::logic::<Traced, _, _>(&mut logic, exchange, image, &mut Log).await;
 }
 
 /// The journal goes to the log: commands for a replay, states for people.

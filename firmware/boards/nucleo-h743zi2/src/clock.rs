@@ -9,6 +9,8 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 
+/// Clock of the core, MHz.
+pub const CORE_MHZ: u32 = 400;
 /// Clock of the timers on both peripheral buses, Hz: twice the buses', whose own is a quarter of the core's.
 pub const TIMERS_HZ: f32 = 200e6;
 

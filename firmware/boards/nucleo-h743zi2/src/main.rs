@@ -13,7 +13,7 @@
 //! | 0x30 | `ETH`, `USART2` | wake the link's tasks |
 //! | 0x30 | `SAI1`, no device's | everything else |
 //!
-//! What they share is a mailbox, a copy under a critical section; nothing is computed in one.
+//! What they share is a mailbox, which keeps no interrupt off.
 
 #![no_std]
 #![no_main]
@@ -40,9 +40,9 @@ use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_time::{Duration, Instant};
 use firmware::store::Network;
-use firmware::tasks::Exchange;
 use model_core::machine::Machine;
 use panel::Panel;
+use simulator::Exchange;
 use static_cell::StaticCell;
 use wires::Wires;
 

@@ -4,7 +4,8 @@ use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::peripherals::{PB0, PB14, PE1};
 use embassy_time::Timer;
-use firmware::tasks::Exchange;
+
+use crate::simulator::Exchange;
 
 /// Period of the panel, ms: as quick as an eye.
 const PERIOD_MS: u64 = 50;

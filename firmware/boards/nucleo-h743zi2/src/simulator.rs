@@ -4,13 +4,14 @@
 
 use core::cell::RefCell;
 
+use cortex_m::peripheral::DWT;
 use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::journal::Journal;
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
-use firmware::tasks::{self, Exchange};
+use firmware::tasks::{self, Stopwatch};
 use firmware::{SPANS, Scalar};
 use model_core::drive::Drive;
 use model_core::image::{Commands, Feedback, Image};
@@ -21,6 +22,20 @@ use static_cell::StaticCell;
 
 use crate::net::LocalService;
 use crate::wires::Wires;
+
+/// What the tasks hand to each other.
+pub type Exchange = tasks::Exchange<Scalar>;
+
+/// The core's own count of its cycles.
+struct Cycles;
+
+impl Stopwatch for Cycles {
+    const PER_US: u32 = crate::clock::CORE_MHZ;
+
+    fn count() -> u32 {
+        DWT::cycle_count()
+    }
+}
 
 /// The timed tasks, each in its executor, from one common start.
 pub fn start(
@@ -55,7 +70,7 @@ pub fn service(machine: &Machine) -> LocalService {
 #[embassy_executor::task]
 async fn plant(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
     match Plant::<Scalar, SPANS>::new(machine) {
-        Ok(mut plant) => tasks::plant(start, &mut plant, exchange).await,
+        Ok(mut plant) => tasks::plant::<Cycles, _, _>(start, &mut plant, exchange).await,
         Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
     }
 }
@@ -63,7 +78,7 @@ async fn plant(start: Instant, machine: &'static Machine, exchange: &'static Exc
 /// The regulators, every 10 ms.
 #[embassy_executor::task]
 async fn drive(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
-    tasks::drive(start, &mut Drive::new(machine), exchange).await;
+    tasks::drive::<Cycles, _>(start, &mut Drive::new(machine), exchange).await;
 }
 
 /// The drive logic, in the background.
@@ -73,7 +88,7 @@ pub async fn logic(
     exchange: &'static Exchange,
     image: &'static ImageCell<NoopRawMutex>,
 ) {
-    tasks::logic(&mut Logic::new(machine), exchange, image, &mut Log).await;
+    tasks::logic::<Cycles, _, _>(&mut Logic::new(machine), exchange, image, &mut Log).await;
 }
 
 /// The journal goes to the log.

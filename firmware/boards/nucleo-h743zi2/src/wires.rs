@@ -16,13 +16,13 @@ use embassy_stm32::timer::low_level::{
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use embassy_stm32::timer::{Ch1, Ch3, Ch4, Channel, GeneralInstance4Channel};
 use embassy_time::{Duration, Instant, Timer as Delay};
-use firmware::tasks::Exchange;
 use firmware::wired::{Analog, Angle, Encoder, Inputs, Leads, Outputs, Seen, Setting};
 use model_core::exchange::Measurements;
 use model_core::machine::Machine;
 use model_core::plant::PLANT_PERIOD_MS;
 
 use crate::clock::TIMERS_HZ;
+use crate::simulator::Exchange;
 
 /// Largest code of the converter, 12 bits.
 const DAC_FULL: u16 = 4095;

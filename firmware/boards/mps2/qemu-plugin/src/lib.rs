@@ -18,6 +18,9 @@ use std::sync::atomic::AtomicU64;
 const CB_NO_REGS: c_int = 0;
 /// `QEMU_PLUGIN_INLINE_ADD_U64`: add a number to a counter.
 const INLINE_ADD_U64: c_int = 0;
+/// `QEMU_PLUGIN_MEM_RW`: reads and writes. QEMU 7.2 mistakes the one for the other when only one is wanted, so the
+/// callback chooses.
+const MEM_READ_WRITE: c_int = 3;
 
 type PluginId = u64;
 
@@ -49,6 +52,23 @@ unsafe extern "C" {
         counter: *mut c_void,
         number: u64,
     );
+    fn qemu_plugin_register_vcpu_insn_exec_inline(
+        instruction: *mut RawInstruction,
+        operation: c_int,
+        counter: *mut c_void,
+        number: u64,
+    );
+    fn qemu_plugin_register_vcpu_mem_cb(
+        instruction: *mut RawInstruction,
+        callback: unsafe extern "C" fn(c_uint, u32, u64, *mut c_void),
+        flags: c_int,
+        access: c_int,
+        data: *mut c_void,
+    );
+    fn qemu_plugin_mem_is_store(access: u32) -> bool;
+    fn qemu_plugin_insn_data(instruction: *const RawInstruction) -> *const c_void;
+    fn qemu_plugin_insn_size(instruction: *const RawInstruction) -> usize;
+    fn qemu_plugin_insn_vaddr(instruction: *const RawInstruction) -> u64;
     fn qemu_plugin_insn_symbol(instruction: *const RawInstruction) -> *const c_char;
     fn qemu_plugin_register_vcpu_insn_exec_cb(
         instruction: *mut RawInstruction,
@@ -71,6 +91,11 @@ pub trait Plugin: Sized + Send + Sync + 'static {
 
     /// An instruction is about to be executed that [`Instruction::call`] was asked for.
     fn executed(&self, value: usize);
+
+    /// An instruction that [`Instruction::watch`] was asked for has accessed memory.
+    fn accessed(&self, value: usize, address: u64) {
+        let _ = (value, address);
+    }
 
     /// QEMU ends.
     fn ended(&self) {}
@@ -125,7 +150,65 @@ impl<'a> Block<'a> {
     }
 }
 
+/// What an instruction does to memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// It reads.
+    Read,
+    /// It writes.
+    Write,
+}
+
 impl Instruction<'_> {
+    /// Its address.
+    pub fn address(&self) -> u64 {
+        // SAFETY: as for the block.
+        unsafe { qemu_plugin_insn_vaddr(self.instruction) }
+    }
+
+    /// Its bytes, as they stand in memory.
+    pub fn bytes(&self) -> &[u8] {
+        // SAFETY: as for the block; QEMU has as many bytes there as it says.
+        unsafe {
+            let data = qemu_plugin_insn_data(self.instruction).cast();
+            std::slice::from_raw_parts(data, qemu_plugin_insn_size(self.instruction))
+        }
+    }
+
+    /// Whenever it is executed, one is added to a counter. Unlike [`Block::count`] this is exact also where a block is
+    /// left before its end, by an exception or an access to a device.
+    pub fn count(&self, counter: &'static AtomicU64) {
+        let counter = counter.as_ptr().cast();
+        // SAFETY: as for the block; the counter lives as long as the process.
+        unsafe {
+            qemu_plugin_register_vcpu_insn_exec_inline(
+                self.instruction,
+                INLINE_ADD_U64,
+                counter,
+                1,
+            );
+        }
+    }
+
+    /// After each of its accesses to memory of a kind, [`Plugin::accessed`] is called with a value.
+    pub fn watch<P: Loaded>(&self, access: Access, value: usize) {
+        let value = std::ptr::without_provenance_mut(value);
+        let callback = match access {
+            Access::Read => on_access::<P, false>,
+            Access::Write => on_access::<P, true>,
+        };
+        // SAFETY: as for the block; the callback has the type that QEMU expects and stays loaded.
+        unsafe {
+            qemu_plugin_register_vcpu_mem_cb(
+                self.instruction,
+                callback,
+                CB_NO_REGS,
+                MEM_READ_WRITE,
+                value,
+            );
+        }
+    }
+
     /// The guest's function that it belongs to.
     pub fn symbol(&self) -> Option<&CStr> {
         // SAFETY: as for the block; the name is terminated and QEMU's own.
@@ -162,6 +245,21 @@ unsafe extern "C" fn on_translation<P: Loaded>(_: PluginId, block: *mut RawBlock
 unsafe extern "C" fn on_execution<P: Loaded>(_cpu: c_uint, value: *mut c_void) {
     if let Some(plugin) = P::cell().get() {
         plugin.executed(value.addr());
+    }
+}
+
+unsafe extern "C" fn on_access<P: Loaded, const WRITE: bool>(
+    _cpu: c_uint,
+    access: u32,
+    address: u64,
+    value: *mut c_void,
+) {
+    // SAFETY: a function of the description alone.
+    let writes = unsafe { qemu_plugin_mem_is_store(access) };
+    if writes == WRITE
+        && let Some(plugin) = P::cell().get()
+    {
+        plugin.accessed(value.addr(), address);
     }
 }
 

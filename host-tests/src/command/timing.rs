@@ -1,0 +1,184 @@
+//! `winder timing`
+
+use std::fmt::Write;
+use std::process::ExitCode;
+
+use anyhow::{Result, ensure};
+use model_core::image::{
+    DRIVE_JITTER_MAX, DRIVE_OVERRUNS, DRIVE_TIME_MAX, LOGIC_OVERRUNS, PLANT_JITTER_MAX,
+    PLANT_OVERRUNS, PLANT_TICKS, PLANT_TIME_MAX, TRAJECTORY,
+};
+
+use crate::setup::{self, Warnings};
+use crate::timing::golden::{self, Outcome};
+use crate::timing::load::{Kind, LOADS, POLLING};
+use crate::timing::{self, Bar, Firmware, Measured};
+use crate::twin::{CORES, Core};
+
+/// What to measure.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Args {
+    /// Core: M7, M4F or M3; may be given several times [default: all]
+    #[arg(long = "core", value_name = "NAME")]
+    cores: Vec<String>,
+    /// Load: idle, "polling PLC" or "packet storm"; may be given several times [default: all]
+    #[arg(long = "load", value_name = "NAME")]
+    loads: Vec<String>,
+    /// Run so many activations of the plant's task under the polling PLC, and ask the firmware what it has noticed
+    #[arg(long, value_name = "N")]
+    ticks: Option<u64>,
+    /// Keep the table as the one to compare with
+    #[arg(long)]
+    bless: bool,
+}
+
+/// The table that is kept.
+const TABLE: &str = "timing.md";
+
+/// Measures, prints, and compares with the table that is kept.
+pub fn main(args: &Args) -> Result<ExitCode> {
+    let cores = chosen(&args.cores, &CORES, |core| core.name)?;
+    let loads = chosen(&args.loads, LOADS, |kind| kind.name)?;
+    let whole = args.cores.is_empty() && args.loads.is_empty();
+    ensure!(
+        whole || !args.bless,
+        "only the whole table can be kept: --bless goes without --core and --load"
+    );
+    let firmware = Firmware::prepare(Warnings::Shown)?;
+    if let Some(ticks) = args.ticks {
+        return endure(&firmware, &cores, ticks);
+    }
+    let (table, bars) = measure(&firmware, &cores, &loads)?;
+    let table = golden::with_compiler(&setup::compiler()?, &table);
+    print!("{table}");
+    let missed = judge(&bars);
+    let mut as_kept = true;
+    if args.bless {
+        golden::keep(TABLE, &table)?;
+        println!("\nkept as {}", golden::path(TABLE).display());
+    } else if whole {
+        as_kept = tell(&golden::compare(TABLE, &table)?, "cargo winder timing");
+    }
+    Ok(if missed || !as_kept {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+/// Fails where the table is not as kept or a bar is missed.
+pub fn check() -> Result<()> {
+    let outcome = main(&Args::default())?;
+    ensure!(
+        outcome == ExitCode::SUCCESS,
+        "the firmware's timing is not as kept, or a bar is missed, see above"
+    );
+    Ok(())
+}
+
+/// Says how a table compares with the one that is kept; whether that is well.
+pub fn tell(outcome: &Outcome, command: &str) -> bool {
+    match outcome {
+        Outcome::Same => println!("\nas kept"),
+        Outcome::OtherCompiler(kept) => println!(
+            "\nnot compared: the kept table is of {kept}, and another compiler makes other instructions; only the bars \
+             count"
+        ),
+        Outcome::Differs(lines) => {
+            println!("\nnot as kept:\n{lines}\nif it shall be so, `{command} --bless` keeps it");
+        }
+        Outcome::Missing => println!("\nno table is kept: `{command} --bless` keeps this one"),
+    }
+    matches!(outcome, Outcome::Same | Outcome::OtherCompiler(_))
+}
+
+/// A long run: the first load whose PLC asks, on each core.
+fn endure(firmware: &Firmware, cores: &[&Core], ticks: u64) -> Result<ExitCode> {
+    let mut none = true;
+    for core in cores {
+        let endured = firmware.endure(core, &LOADS[POLLING], ticks, |ticks| {
+            eprintln!("winder: {ticks} ticks");
+        })?;
+        println!("{}: {}", core.name, endured.done);
+        let f = &endured.feedback;
+        println!(
+            "  ticks {}, hash {:08x}",
+            f.double(&PLANT_TICKS),
+            f.double(&TRAJECTORY)
+        );
+        for (task, overruns, time, jitter) in [
+            ("plant", &PLANT_OVERRUNS, &PLANT_TIME_MAX, &PLANT_JITTER_MAX),
+            ("drive", &DRIVE_OVERRUNS, &DRIVE_TIME_MAX, &DRIVE_JITTER_MAX),
+        ] {
+            println!(
+                "  {task}: {} overruns, longest {} µs, latest start {} µs",
+                f.word(overruns),
+                f.word(time),
+                f.word(jitter)
+            );
+        }
+        println!("  logic: {} overruns", f.word(&LOGIC_OVERRUNS));
+        none &= [&PLANT_OVERRUNS, &DRIVE_OVERRUNS, &LOGIC_OVERRUNS]
+            .iter()
+            .all(|signal| f.word(signal) == 0);
+    }
+    Ok(if none {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+fn chosen<'a, T>(names: &[String], all: &'a [T], name: fn(&T) -> &str) -> Result<Vec<&'a T>> {
+    for wanted in names {
+        let known: Vec<_> = all.iter().map(name).collect();
+        ensure!(
+            known.contains(&wanted.as_str()),
+            "{wanted:?} is none of {}",
+            known.join(", ")
+        );
+    }
+    let wanted = |item: &&T| names.is_empty() || names.iter().any(|wanted| wanted == name(item));
+    Ok(all.iter().filter(wanted).collect())
+}
+
+fn measure(firmware: &Firmware, cores: &[&Core], loads: &[&Kind]) -> Result<(String, Vec<Bar>)> {
+    let (mut table, mut bars) = (String::new(), Vec::new());
+    for kind in loads {
+        let mut all: Vec<(&Core, Measured)> = Vec::new();
+        for core in cores {
+            let measured = firmware.measure(core, kind)?;
+            // a string takes all that is written to it
+            let _ = writeln!(
+                table,
+                "# {} ({}, {}), {}\n\nLoad: {}.\n\n{}",
+                core.name,
+                core.board,
+                timing::scalar(core),
+                kind.name,
+                measured.done,
+                measured.table()
+            );
+            bars.extend(timing::bars(core, kind, &measured));
+            all.push((core, measured));
+        }
+        let of = |core: &Core| all.iter().find(|(c, _)| *c == core).map(|(_, m)| m);
+        if let (Some(m7), Some(m3)) = (of(&CORES[0]), of(&CORES[2])) {
+            bars.push(timing::ratio(kind, m7, m3));
+        }
+    }
+    Ok((table, bars))
+}
+
+/// Says which bars are missed; whether there are any.
+fn judge(bars: &[Bar]) -> bool {
+    println!("# Bars\n\n| What | Is | At most | |\n|---|---:|---:|---|");
+    for bar in bars {
+        let verdict = if bar.reached() { "reached" } else { "MISSED" };
+        println!(
+            "| {} | {:.2} | {} | {verdict} |",
+            bar.what, bar.value, bar.limit
+        );
+    }
+    bars.iter().any(|bar| !bar.reached())
+}
