@@ -11,6 +11,7 @@ pub mod journal;
 pub mod link;
 pub mod lockstep;
 pub mod mailbox;
+pub mod net;
 pub mod store;
 pub mod tasks;
 pub mod wired;

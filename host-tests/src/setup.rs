@@ -79,10 +79,17 @@ pub fn twin(target: &str, warnings: Warnings) -> Result<PathBuf> {
 }
 
 /// The firmware for the dev board: an ELF file, built where it is not up to date.
-pub fn nucleo(warnings: Warnings) -> Result<PathBuf> {
+pub fn nucleo_h743zi2(warnings: Warnings) -> Result<PathBuf> {
     target(TARGET)?;
     let what = "the firmware for the NUCLEO-H743ZI2";
     firmware("board-nucleo-h743zi2", what, TARGET, warnings)
+}
+
+/// The firmware for the dev board without floating-point unit, likewise.
+pub fn nucleo_f207zg(warnings: Warnings) -> Result<PathBuf> {
+    target(TARGET_SOFT)?;
+    let what = "the firmware for the NUCLEO-F207ZG";
+    firmware("board-nucleo-f207zg", what, TARGET_SOFT, warnings)
 }
 
 /// A board's package for its target: an ELF file, built where it is not up to date.

@@ -1,8 +1,11 @@
-//! Links the firmware by the board's own script; `mps2.x` says why not by cortex-m-rt's.
+//! Links the firmware by the board's own script; `sections.x` says why not by cortex-m-rt's.
 
 fn main() {
-    println!("cargo::rerun-if-changed=mps2.x");
+    for script in ["mps2.x", "../sections.x"] {
+        println!("cargo::rerun-if-changed={script}");
+    }
     let here = std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it");
+    println!("cargo::rustc-link-search={here}/..");
     println!("cargo::rustc-link-arg-bins=-T{here}/mps2.x");
     println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
 }

@@ -25,7 +25,7 @@ pub struct Args {
 
 /// Builds the firmware for the NUCLEO-H743ZI2, flashes it and shows its log until Ctrl-C.
 pub fn main(args: &Args) -> Result<ExitCode> {
-    let image = setup::nucleo(Warnings::Shown)?;
+    let image = setup::nucleo_h743zi2(Warnings::Shown)?;
     let mut command = Command::new(PROBE_RS);
     command.args(["run", "--chip", CHIP]);
     if let Some(probe) = &args.probe {

@@ -20,7 +20,8 @@ pub fn main() -> Result<ExitCode> {
         ("firmware builds without warnings", || {
             setup::mps2_with(Warnings::Denied)?;
             setup::counter(Warnings::Denied)?;
-            setup::nucleo(Warnings::Denied)?;
+            setup::nucleo_h743zi2(Warnings::Denied)?;
+            setup::nucleo_f207zg(Warnings::Denied)?;
             setup::tracer(Warnings::Denied)?;
             setup::mps2_for(TARGET_SOFT, Warnings::Denied)?;
             setup::twin(TARGET, Warnings::Denied)?;
@@ -87,34 +88,26 @@ fn lints() -> Result<()> {
         return Ok(());
     }
     cargo(&["clippy", "--all-targets", "--", "-D", "warnings"])?;
-    let firmware = [
-        "clippy",
-        "--release",
-        "-p",
-        "board-mps2",
-        "-p",
-        "board-mps2-twin",
-        "-p",
-        "board-nucleo-h743zi2",
-        "--target",
-        TARGET,
-    ];
-    cargo(&[&firmware[..], &["--", "-D", "warnings"]].concat())?;
-    cargo(&[
-        "clippy",
-        "--release",
-        "-p",
-        "qemu-pace",
-        "-p",
-        "qemu-count",
-        "-p",
-        "qemu-trace",
-        "-p",
-        "qemu-plugin",
-        "--",
-        "-D",
-        "warnings",
-    ])
+    clippy(
+        &["board-mps2", "board-mps2-twin", "board-nucleo-h743zi2"],
+        Some(TARGET),
+    )?;
+    clippy(&["board-nucleo-f207zg"], Some(TARGET_SOFT))?;
+    clippy(
+        &["qemu-pace", "qemu-count", "qemu-trace", "qemu-plugin"],
+        None,
+    )
+}
+
+/// Lints packages for a target, or for this PC.
+fn clippy(packages: &[&str], target: Option<&str>) -> Result<()> {
+    let mut arguments = vec!["clippy", "--release"];
+    for package in packages {
+        arguments.extend(["-p", *package]);
+    }
+    arguments.extend(target.iter().flat_map(|target| ["--target", *target]));
+    arguments.extend(["--", "-D", "warnings"]);
+    cargo(&arguments)
 }
 
 fn cargo(arguments: &[&str]) -> Result<()> {

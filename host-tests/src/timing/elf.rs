@@ -69,7 +69,7 @@ impl Elf {
             .with_context(|| format!("cannot read the lines of {}", path.display()))?;
         Ok(Self {
             symbols,
-            sizes: sizes(&file),
+            sizes: sizes(&file, stack),
             stack,
             lines,
         })
@@ -104,7 +104,6 @@ impl Elf {
     }
 
     /// What it takes of the memories.
-    /// What it takes of the memories.
     pub fn sizes(&self) -> Sizes {
         self.sizes
     }
@@ -115,8 +114,11 @@ impl Elf {
     }
 }
 
-fn sizes(file: &object::File<'_>) -> Sizes {
-    let mut sizes = Sizes::default();
+fn sizes(file: &object::File<'_>, stack: (u64, u64)) -> Sizes {
+    let mut sizes = Sizes {
+        stack: stack.1 - stack.0,
+        ..Sizes::default()
+    };
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags } = section.flags() else {
             continue;
@@ -129,11 +131,12 @@ fn sizes(file: &object::File<'_>) -> Sizes {
             continue;
         }
         let size = section.size();
-        let stack = section.name() == Ok(".stack");
-        let stored = !stack && section.kind() != SectionKind::UninitializedData;
-        if stack {
-            sizes.stack += size;
-        } else if writable {
+        // known by its symbols: not every script gives it a section
+        if section.name() == Ok(".stack") {
+            continue;
+        }
+        let stored = section.kind() != SectionKind::UninitializedData;
+        if writable {
             sizes.ram += size;
         }
         if stored && section.name() != Ok(".uninit") {

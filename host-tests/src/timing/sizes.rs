@@ -3,36 +3,89 @@
 //! Not here: how deep the stack is used; that is measured.
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use super::elf::Elf;
-use super::scalar;
-use crate::setup::{self, Warnings};
-use crate::twin::CORES;
+use crate::setup::{self, TARGET, TARGET_SOFT, Warnings};
 
-/// The table of all boards, as Markdown.
+/// A firmware, and the memories of its chip.
+struct Board {
+    package: &'static str,
+    cores: &'static str,
+    numbers: &'static str,
+    build: fn(Warnings) -> Result<PathBuf>,
+    /// Flash and RAM of the chip in bytes, where it is a real one, and the part of them that the firmware may take.
+    chip: Option<(u64, u64, f64)>,
+}
+
+const KIB: u64 = 1024;
+
+const BOARDS: [Board; 4] = [
+    Board {
+        package: "board-mps2",
+        cores: "M7, M4F",
+        numbers: "f32",
+        build: |warnings| setup::mps2_for(TARGET, warnings),
+        chip: None,
+    },
+    Board {
+        package: "board-mps2",
+        cores: "M3",
+        numbers: "fixed",
+        build: |warnings| setup::mps2_for(TARGET_SOFT, warnings),
+        chip: None,
+    },
+    // Source: DS12110, table 2; all RAM that is not a copy of another
+    Board {
+        package: "board-nucleo-h743zi2",
+        cores: "M7",
+        numbers: "f32",
+        build: setup::nucleo_h743zi2,
+        chip: Some((2048 * KIB, 1024 * KIB, 0.5)),
+    },
+    // Source: DS6329, table 2; a chip that is only just large enough
+    Board {
+        package: "board-nucleo-f207zg",
+        cores: "M3",
+        numbers: "fixed",
+        build: setup::nucleo_f207zg,
+        chip: Some((1024 * KIB, 128 * KIB, 1.0)),
+    },
+];
+
+/// The table of all boards, as Markdown; fails where a chip is too small.
 pub fn table(warnings: Warnings) -> Result<String> {
     let mut out = String::from(
         "# Sizes in bytes\n\n\
-         | Package | Cores | Numbers | Flash | Static RAM | Stack reserved |\n|---|---|---|---:|---:|---:|\n",
+         | Package | Cores | Numbers | Flash | Static RAM | Stack reserved | Of the chip: flash, RAM |\n\
+         |---|---|---|---:|---:|---:|---:|\n",
     );
-    let mut targets: Vec<&str> = CORES.iter().map(|core| core.target).collect();
-    targets.dedup();
-    for target in targets {
-        let cores: Vec<_> = CORES.iter().filter(|core| core.target == target).collect();
-        let names: Vec<_> = cores.iter().map(|core| core.name).collect();
-        let numbers = cores.first().map_or("", |core| scalar(core));
-        let firmware = setup::mps2_for(target, warnings)?;
-        let sizes = Elf::read(&firmware)?.sizes();
+    for board in &BOARDS {
+        let sizes = Elf::read(&(board.build)(warnings)?)?.sizes();
+        let ram = sizes.ram + sizes.stack;
+        let share = match board.chip {
+            None => "–".into(),
+            Some((flash_of_chip, ram_of_chip, part)) => {
+                let shares = [(sizes.flash, flash_of_chip), (ram, ram_of_chip)]
+                    .map(|(taken, there)| taken as f64 / there as f64);
+                ensure!(
+                    shares.iter().all(|share| *share <= part),
+                    "{} takes {} bytes of flash and {ram} of RAM, which is more than {part} of its chip's \
+                     {flash_of_chip} and {ram_of_chip}",
+                    board.package,
+                    sizes.flash,
+                );
+                let [flash, ram] = shares.map(|share| 100.0 * share);
+                format!("{flash:.0} %, {ram:.0} %")
+            }
+        };
         // a string takes all that is written to it
         let _ = writeln!(
             out,
-            "| board-mps2 | {} | {numbers} | {} | {} | {} |",
-            names.join(", "),
-            sizes.flash,
-            sizes.ram,
-            sizes.stack
+            "| {} | {} | {} | {} | {} | {} | {share} |",
+            board.package, board.cores, board.numbers, sizes.flash, sizes.ram, sizes.stack
         );
     }
     Ok(out)

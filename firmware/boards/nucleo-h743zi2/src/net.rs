@@ -1,14 +1,10 @@
 //! The Ethernet: an address, and a TCP server on the Modbus port.
 //!
-//! Does not know what is said on a connection: the library's session does. An unplugged cable stops nothing: the
+//! Does not know what is said on a connection: the library does. An unplugged cable stops nothing: the
 //! address comes when the cable does.
 
 use embassy_executor::Spawner;
-use embassy_net::tcp::TcpSocket;
-use embassy_net::{
-    Config, ConfigV4, IpAddress, Ipv4Address, Ipv4Cidr, Runner, Stack, StackResources,
-    StaticConfigV4,
-};
+use embassy_net::{Config, Runner, Stack, StackResources};
 use embassy_stm32::eth::{self, Ethernet, GenericPhy, Sma};
 use embassy_stm32::peripherals::{
     ETH, ETH_SMA, PA1, PA2, PA7, PB13, PC1, PC4, PC5, PG11, PG13, RNG,
@@ -16,11 +12,8 @@ use embassy_stm32::peripherals::{
 use embassy_stm32::rng::{self, Rng};
 use embassy_stm32::{Peri, bind_interrupts, uid};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
-use embassy_time::{Duration, with_timeout};
 use firmware::link::Service;
-use firmware::link::control::{Peer, Protocol};
-use firmware::link::modbus::tcp::{End, Timeouts, session};
-use firmware::link::seats::Seats;
+use firmware::net::{self, Places};
 use firmware::store::Network;
 use static_cell::StaticCell;
 
@@ -33,30 +26,10 @@ bind_interrupts!(struct Irqs {
 
 type Device = Ethernet<'static, ETH, GenericPhy<Sma<'static, ETH_SMA>>>;
 
-/// Modbus TCP, from the IANA registry.
-const MODBUS_PORT: u16 = 502;
-/// Clients that can be served at once.
-const MODBUS_CLIENTS: usize = 8;
-/// One more listens, and gives the newcomer somebody's place when all are taken.
-const MODBUS_SOCKETS: usize = MODBUS_CLIENTS + 1;
 /// Of DHCP.
 const OTHER_SOCKETS: usize = 1;
-/// More than two of the longest Modbus frames (260 bytes), in each direction.
-const BUFFER_BYTES: usize = 768;
-
-/// A silent client is asked whether it is there this often …
-const KEEP_ALIVE: Duration = Duration::from_secs(5);
-/// … and is given up when nothing came from it for this long.
-const TIMEOUT: Duration = Duration::from_secs(15);
-/// The time for the last bytes of a connection to get through.
-const CLOSING: Duration = Duration::from_secs(2);
-/// A DHCP server that has not answered by then is not there.
-const DHCP: Duration = Duration::from_secs(10);
-
 /// What the background's tasks share: they take turns, so a lock need not keep anything off.
 pub type LocalService = Service<'static, NoopRawMutex>;
-
-type Places = Seats<NoopRawMutex, MODBUS_CLIENTS>;
 
 /// What the Ethernet takes of the chip: RMII as the board is wired (UM2407, table 12), and random numbers.
 pub struct Resources {
@@ -84,9 +57,9 @@ pub struct Resources {
 
 /// Starts the network. Runs in the background, where everything of the network stays.
 pub fn start(spawner: Spawner, r: Resources, network: Network, service: LocalService) {
-    static RESOURCES: StaticCell<StackResources<{ MODBUS_SOCKETS + OTHER_SOCKETS }>> =
+    static RESOURCES: StaticCell<StackResources<{ net::MODBUS_SOCKETS + OTHER_SOCKETS }>> =
         StaticCell::new();
-    static PLACES: StaticCell<Places> = StaticCell::new();
+    static PLACES: StaticCell<Places<NoopRawMutex>> = StaticCell::new();
 
     let seed = Rng::new(r.rng, Irqs).next_u64();
     let device = Ethernet::new(
@@ -106,7 +79,7 @@ pub fn start(spawner: Spawner, r: Resources, network: Network, service: LocalSer
         r.sma.2,
     );
     let mut config = Config::default();
-    config.ipv4 = ip(network);
+    config.ipv4 = net::address(network);
     let (stack, runner) =
         embassy_net::new(device, config, RESOURCES.init(StackResources::new()), seed);
 
@@ -115,26 +88,9 @@ pub fn start(spawner: Spawner, r: Resources, network: Network, service: LocalSer
         spawner.spawn(fall_back(stack).expect("first"));
     }
     let places = &*PLACES.init(Places::new());
-    for _ in 0..MODBUS_SOCKETS {
+    for _ in 0..net::MODBUS_SOCKETS {
         spawner.spawn(serve_modbus(stack, service, places).expect("as many tasks as sockets"));
     }
-}
-
-fn ip(network: Network) -> ConfigV4 {
-    let Network::Static {
-        address,
-        prefix,
-        gateway,
-    } = network
-    else {
-        return ConfigV4::Dhcp(Default::default());
-    };
-    let address_of = |[a, b, c, d]: [u8; 4]| Ipv4Address::new(a, b, c, d);
-    ConfigV4::Static(StaticConfigV4 {
-        address: Ipv4Cidr::new(address_of(address), prefix),
-        gateway: gateway.map(address_of),
-        dns_servers: Default::default(),
-    })
 }
 
 /// Of the chip's own number, in the range that everybody may use (IEEE 802, locally administered).
@@ -152,51 +108,19 @@ async fn run(mut runner: Runner<'static, Device>) -> ! {
     runner.run().await
 }
 
-/// Takes the fixed address when no server gives one; a cable that is plugged in later starts anew.
 #[embassy_executor::task]
-async fn fall_back(stack: Stack<'static>) {
-    loop {
-        stack.wait_link_up().await;
-        if with_timeout(DHCP, stack.wait_config_up()).await.is_err() {
-            defmt::warn!("no DHCP server: fixed address");
-            stack.set_config_v4(ip(Network::FALLBACK));
-        }
-        if let Some(config) = stack.config_v4() {
-            defmt::info!("address {}", defmt::Display2Format(&config.address));
-        }
-        stack.wait_link_down().await;
-        stack.set_config_v4(ip(Network::Dhcp));
-    }
+async fn fall_back(stack: Stack<'static>) -> ! {
+    net::fall_back(stack, |address| {
+        defmt::info!("address {}", defmt::Display2Format(&address));
+    })
+    .await
 }
 
-/// One client after the other.
-#[embassy_executor::task(pool_size = MODBUS_SOCKETS)]
-async fn serve_modbus(stack: Stack<'static>, service: LocalService, places: &'static Places) -> ! {
-    let mut rx = [0; BUFFER_BYTES];
-    let mut tx = [0; BUFFER_BYTES];
-    let timeouts = Timeouts::default();
-    let mut socket = TcpSocket::new(stack, &mut rx, &mut tx);
-    socket.set_keep_alive(Some(KEEP_ALIVE));
-    socket.set_timeout(Some(TIMEOUT));
-    // An answer is one write: holding it back for more would only delay it.
-    socket.set_nagle_enabled(false);
-    loop {
-        if socket.accept(MODBUS_PORT).await.is_ok() {
-            let peer = socket.remote_endpoint().map(|from| match from.addr {
-                IpAddress::Ipv4(address) => Peer::Ip(address),
-            });
-            let client = peer.and_then(|peer| service.enter(peer, Protocol::ModbusTcp));
-            if let Some(client) = client {
-                let place = places.take();
-                let talk = session(&mut socket, &client, &timeouts, || place.answered());
-                if place.hold(talk).await == Some(End::Closed) {
-                    socket.close();
-                    let _ = with_timeout(CLOSING, socket.flush()).await;
-                }
-            }
-        }
-        // Whatever state it is in: the socket must be closed to listen again.
-        socket.abort();
-        let _ = with_timeout(CLOSING, socket.flush()).await;
-    }
+#[embassy_executor::task(pool_size = net::MODBUS_SOCKETS)]
+async fn serve_modbus(
+    stack: Stack<'static>,
+    service: LocalService,
+    places: &'static Places<NoopRawMutex>,
+) -> ! {
+    net::serve_modbus(stack, service, places).await
 }

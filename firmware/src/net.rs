@@ -1,0 +1,106 @@
+//! What boards with embassy's network stack share: where the address comes from, and the Modbus server.
+//!
+//! Not here: the network device, and the stack that a board builds around it; what is said on a connection, which is
+//! the link's session. There is no IPv6 and no queue of connections: with every socket busy the next client is refused.
+
+use embassy_net::tcp::TcpSocket;
+use embassy_net::{ConfigV4, IpAddress, Ipv4Address, Ipv4Cidr, Stack, StaticConfigV4};
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use embassy_time::{Duration, with_timeout};
+
+use crate::link::Service;
+use crate::link::control::{Peer, Protocol};
+use crate::link::modbus::tcp::{End, Timeouts, session};
+use crate::link::seats::Seats;
+use crate::store::Network;
+
+/// Modbus TCP, from the IANA registry.
+const MODBUS_PORT: u16 = 502;
+/// Clients that can be served at once.
+pub const MODBUS_CLIENTS: usize = 8;
+/// One more listens, and gives the newcomer somebody's place when all are taken.
+pub const MODBUS_SOCKETS: usize = MODBUS_CLIENTS + 1;
+/// More than two of the longest Modbus frames (260 bytes), in each direction. Small enough that all sockets together
+/// fit into a network device's receive FIFO of 10 KiB, so that clients alone cannot overrun it.
+const BUFFER_BYTES: usize = 768;
+
+/// A silent client is asked whether it is there this often …
+const KEEP_ALIVE: Duration = Duration::from_secs(5);
+/// … and is given up when nothing came from it for this long.
+const TIMEOUT: Duration = Duration::from_secs(15);
+/// The time for the last bytes of a connection to get through.
+const CLOSING: Duration = Duration::from_secs(2);
+/// A DHCP server that has not answered by then is not there.
+const DHCP: Duration = Duration::from_secs(10);
+
+/// The places of the Modbus clients.
+pub type Places<M> = Seats<M, MODBUS_CLIENTS>;
+
+/// One client after the other: the task of one socket, of which a board runs [`MODBUS_SOCKETS`].
+pub async fn serve_modbus<M: RawMutex>(
+    stack: Stack<'_>,
+    service: Service<'_, M>,
+    places: &Places<M>,
+) -> ! {
+    let mut rx = [0; BUFFER_BYTES];
+    let mut tx = [0; BUFFER_BYTES];
+    let timeouts = Timeouts::default();
+    let mut socket = TcpSocket::new(stack, &mut rx, &mut tx);
+    socket.set_keep_alive(Some(KEEP_ALIVE));
+    socket.set_timeout(Some(TIMEOUT));
+    // An answer is one write: holding it back for more would only delay it.
+    socket.set_nagle_enabled(false);
+    loop {
+        if socket.accept(MODBUS_PORT).await.is_ok() {
+            let peer = socket.remote_endpoint().map(|from| match from.addr {
+                IpAddress::Ipv4(address) => Peer::Ip(address),
+            });
+            let client = peer.and_then(|peer| service.enter(peer, Protocol::ModbusTcp));
+            if let Some(client) = client {
+                let place = places.take();
+                let talk = session(&mut socket, &client, &timeouts, || place.answered());
+                if place.hold(talk).await == Some(End::Closed) {
+                    socket.close();
+                    let _ = with_timeout(CLOSING, socket.flush()).await;
+                }
+            }
+        }
+        // Whatever state it is in: the socket must be closed to listen again.
+        socket.abort();
+        let _ = with_timeout(CLOSING, socket.flush()).await;
+    }
+}
+
+/// What the stack is configured with.
+pub fn address(network: Network) -> ConfigV4 {
+    let Network::Static {
+        address,
+        prefix,
+        gateway,
+    } = network
+    else {
+        return ConfigV4::Dhcp(Default::default());
+    };
+    let address_of = |[a, b, c, d]: [u8; 4]| Ipv4Address::new(a, b, c, d);
+    ConfigV4::Static(StaticConfigV4 {
+        address: Ipv4Cidr::new(address_of(address), prefix),
+        gateway: gateway.map(address_of),
+        dns_servers: Default::default(),
+    })
+}
+
+/// Takes the fixed address when no DHCP server gives one; a cable that is plugged in later starts anew. `told` gets
+/// the address.
+pub async fn fall_back(stack: Stack<'_>, told: impl Fn(Ipv4Cidr)) -> ! {
+    loop {
+        stack.wait_link_up().await;
+        if with_timeout(DHCP, stack.wait_config_up()).await.is_err() {
+            stack.set_config_v4(address(Network::FALLBACK));
+        }
+        if let Some(config) = stack.config_v4() {
+            told(config.address);
+        }
+        stack.wait_link_down().await;
+        stack.set_config_v4(address(Network::Dhcp));
+    }
+}
