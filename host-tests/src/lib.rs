@@ -6,6 +6,7 @@
 
 pub mod batch;
 pub mod command;
+pub mod conformance;
 pub mod figures;
 pub mod flops;
 pub mod handbook;

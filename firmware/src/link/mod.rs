@@ -63,6 +63,11 @@ impl<'a, M: RawMutex> Client<'a, M> {
         self.service
     }
 
+    /// What came over its line was no frame.
+    pub fn line_error(&self) {
+        self.visit(|_, _, control| control.line_error());
+    }
+
     /// One event on image and control.
     fn visit<R>(&self, f: impl FnOnce(ClientId, &mut Image, &mut Control) -> R) -> R {
         let Service { image, control } = self.service;

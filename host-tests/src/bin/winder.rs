@@ -5,7 +5,8 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use host_tests::command::{
-    bench, demo, figures, flash, machine, replay, run, scenario, signals, size, test, timing,
+    bench, conformance, demo, figures, flash, machine, replay, run, scenario, signals, size, test,
+    timing,
 };
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
@@ -59,6 +60,10 @@ enum Command {
     ///
     /// The file is what `--machine` takes. One of your own names a preset and what differs from it.
     Machine(machine::Args),
+    /// Look whether a Modbus TCP server does what the specification wants, case by case
+    ///
+    /// Without an address, the simulator's own. Exit status 1: a case failed.
+    Conformance(conformance::Args),
     /// Print the signal list as CSV
     Signals(signals::Args),
 }
@@ -91,6 +96,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         // the others start processes, which must end with this one
         Command::Demo(args) => interrupt::install().and_then(|()| demo::main(&args)),
         Command::Run(args) => interrupt::install().and_then(|()| run::main(args)),
+        Command::Conformance(args) => interrupt::install().and_then(|()| conformance::main(&args)),
         Command::Bench(args) => interrupt::install().and_then(|()| bench::main(&args)),
         Command::Flash(args) => interrupt::install().and_then(|()| flash::main(&args)),
         Command::Timing(args) => interrupt::install().and_then(|()| timing::main(&args)),

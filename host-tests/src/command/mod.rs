@@ -1,6 +1,7 @@
 //! The subcommands of `winder`, a module each.
 
 pub mod bench;
+pub mod conformance;
 pub mod demo;
 pub mod figures;
 pub mod flash;

@@ -5,6 +5,7 @@
 
 pub mod identity;
 pub mod pdu;
+pub mod rtu;
 pub mod tcp;
 
 use core::ops::Range;
