@@ -1,4 +1,4 @@
-//! The network: one Ethernet interface with a static address, and a TCP server on the Modbus port.
+//! The network: one Ethernet interface with a static address, a TCP server on the Modbus port, and the HMI's.
 //!
 //! Does not know what is said on a connection: the library's session does. There is no DHCP, no IPv6 and no
 //! queue of connections: with every socket busy the next client is refused.
@@ -16,6 +16,7 @@ use firmware::link::modbus::tcp::{End, Timeouts, session};
 use firmware::link::seats::Seats;
 use static_cell::StaticCell;
 
+use crate::http::{self, LocalDesk};
 use crate::lan9118::Lan9118;
 
 /// The first guest's address on QEMU's user network; QEMU forwards a port of the host to it.
@@ -28,6 +29,7 @@ const MODBUS_PORT: u16 = 502;
 const MODBUS_CLIENTS: usize = 8;
 /// One more listens, and gives the newcomer somebody's place when all are taken.
 const MODBUS_SOCKETS: usize = MODBUS_CLIENTS + 1;
+const SOCKETS: usize = MODBUS_SOCKETS + http::SOCKETS;
 /// More than two of the longest Modbus frames (260 bytes), in each direction; all sockets together fit into the
 /// receive FIFO of the LAN9118 (10 KiB), so that clients alone cannot overrun it.
 const BUFFER_BYTES: usize = 768;
@@ -45,8 +47,8 @@ pub type LocalService = Service<'static, NoopRawMutex>;
 type Places = Seats<NoopRawMutex, MODBUS_CLIENTS>;
 
 /// Starts the network. Runs in the background, where everything of the network stays.
-pub fn start(spawner: Spawner, service: LocalService) {
-    static RESOURCES: StaticCell<StackResources<MODBUS_SOCKETS>> = StaticCell::new();
+pub fn start(spawner: Spawner, service: LocalService, desk: &'static LocalDesk) {
+    static RESOURCES: StaticCell<StackResources<SOCKETS>> = StaticCell::new();
     static PLACES: StaticCell<Places> = StaticCell::new();
 
     let Ok(driver) = Lan9118::start() else {
@@ -68,6 +70,7 @@ pub fn start(spawner: Spawner, service: LocalService) {
     for _ in 0..MODBUS_SOCKETS {
         spawner.spawn(serve_modbus(stack, service, places).expect("as many tasks as sockets"));
     }
+    http::start(spawner, stack, service, desk);
 }
 
 #[embassy_executor::task]
