@@ -3,7 +3,7 @@
  *
  * Not here: what a page shows. The first one is loaded with the frame, the others when they are asked for.
  */
-import { html, render, signal, effect, useState, useEffect } from './vendor/ui.js';
+import { html, render, signal, effect, useState, useEffect, useRef } from './vendor/ui.js';
 import { info, notes, asking, refresh, login, attempt, write, note } from './api.js';
 import { start, state, counts, code, bit, signals } from './live.js';
 import { Icon, Dialog, Field, Lamp, sentence } from './parts.js';
@@ -134,6 +134,19 @@ function Account({ logged }) {
       : null}`;
 }
 
+/** The way between the pages; on a narrow screen it scrolls, and the present one is in sight. */
+function Pages() {
+  const list = useRef();
+  const at = page.value;
+  useEffect(() => {
+    const one = list.current.querySelector('[aria-current]');
+    list.current.scrollLeft = one.offsetLeft - (list.current.clientWidth - one.clientWidth) / 2;
+  }, [at]);
+  return html`<nav class="pages" aria-label="Pages" ref=${list}>
+    ${shown().map(([id, name]) => html`<a key=${id} href=${`#/${id}`} aria-current=${at === id ? 'page' : undefined}><${Icon} name=${id} /><span>${name}</span></a>`)}
+  </nav>`;
+}
+
 /** What is wrong, as long as it is. */
 function Alarm() {
   const fault = counts('fault').value;
@@ -191,9 +204,7 @@ function Password() {
 
 function App() {
   return html`<${Top} /><${Alarm} />
-    <nav class="pages" aria-label="Pages">
-      ${shown().map(([id, name]) => html`<a key=${id} href=${`#/${id}`} aria-current=${page.value === id ? 'page' : undefined}><${Icon} name=${id} /><span>${name}</span></a>`)}
-    </nav>
+    <${Pages} />
     <main id="main" class=${`page-${page.value}`} tabindex="-1"><${Page} id=${page.value} /></main>
     <div class="notes" role="status" aria-live="polite">${notes.value.map((n) => html`<p class=${n.bad ? 'bad' : ''}>${n.text}</p>`)}</div>
     ${asking.value ? html`<${Password} />` : null}`;

@@ -150,7 +150,9 @@ class Scene {
   draw(g, now, dt) {
     const [w, h] = this.size;
     if (!w || !h) return;
-    const small = w < 560;
+    // names are short in a narrow picture; values move out of the way already in a middling one
+    const narrow = w < 560;
+    const small = w < 760;
     // the tallest of parent roll and windup, and room for its labels
     const centre = (r) => {
       // where the roll lies on both drums, seen from the rear drum's axis
@@ -305,10 +307,10 @@ class Scene {
 
     // labels in the picture; the same values stand as text beside it
     const mm = (d) => `Ø ${figure(d, 0)} mm`;
-    const gap = small ? 10 : 14;
-    this.text('uw', parent.x, floor + 16, small ? 'UW' : 'Unwind', 'middle', 'name');
-    this.text('rd', rear.x, floor + 16, small ? 'RD' : 'Rear drum', 'middle', 'name');
-    this.text('fd', front.x, floor + 16, small ? 'FD' : 'Front drum', 'middle', 'name');
+    const gap = 14;
+    this.text('uw', parent.x, floor + 16, narrow ? 'UW' : 'Unwind', 'middle', 'name');
+    this.text('rd', rear.x, floor + 16, narrow ? 'RD' : 'Rear drum', 'middle', 'name');
+    this.text('fd', front.x, floor + 16, narrow ? 'FD' : 'Front drum', 'middle', 'name');
     this.text('duw', parent.x, parent.y - g.spool * scale - (r_uw - g.spool) * scale * 0.36, r_uw * scale > 55 ? mm(now.d_uw) : '', 'middle', 'on');
     // a narrow picture has no room beside its rolls: what has no place is above
     const label = ship.r > 46;
@@ -325,8 +327,8 @@ class Scene {
     const [tx, ty] = small ? [w - 8, 42] : [on.x - on.r - 9, on.y + on.r + t];
     this.text('v', vx, vy, `${figure(now.v, 0)} m/min`, small ? 'end' : 'start', 'big');
     this.text('t', tx, ty, `${figure(now.tension, 0)} N/m`, 'end', `big ${kind}`);
-    this.text('sl', kx + kr * 2.1, ky + 4, small ? '' : 'Slitter', 'start', 'name');
-    this.text('rr', rider.x + 2.2 * rider.r + 8, top + 4, small ? '' : now.down ? 'Rider roll' : 'Rider roll lifted', 'start', 'name');
+    this.text('sl', kx + kr * 2.1, ky + 4, narrow ? '' : 'Slitter', 'start', 'name');
+    this.text('rr', rider.x + 2.2 * rider.r + 8, top + 4, narrow ? '' : now.down ? 'Rider roll' : 'Rider roll lifted', 'start', 'name');
     this.text('torn', torn ? torn[0] + 16 : 0, torn ? torn[1] - 12 : 0, torn ? 'Web break' : '', 'start', 'big broken');
   }
 

@@ -94,7 +94,7 @@ export function Bits({ name, zero = [] }) {
         return html`<li class=${on ? 'on' : ''} key=${b.number}>
           <${Lamp} on=${on} kind=${bad ? 'warn' : 'on'}>
             <span class="n">${b.number}</span><span class="v">${on}</span>
-            <span>${b.description}</span><//>
+            <span class="what">${b.description}</span><//>
         </li>`;
       })}
     </ul>

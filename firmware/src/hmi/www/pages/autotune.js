@@ -34,7 +34,7 @@ function Gains() {
   const [gains] = useGet('gains', 3000);
   const list = gains?.loops ?? [];
   if (!list.length) return null;
-  return html`<section class="card"><h2>Gains in use</h2><div class="scroll"><table><thead><tr><th>Loop</th><th class="n">Gain</th><th class="n">Integral time</th><th>Source</th></tr></thead>
+  return html`<section class="card wide"><h2>Gains in use</h2><div class="scroll"><table><thead><tr><th>Loop</th><th class="n">Gain</th><th class="n">Integral time</th><th>Source</th></tr></thead>
     <tbody>${list.map((l) => html`<tr key=${l.name}><td>${sentence(l.name)}</td><td class="n">${figure(l.gain, l.gain < 10 ? 3 : 0)} ${l.unit ?? ''}</td><td class="n">${figure(l.time_s, 3)} s</td><td>${l.source ?? (l.tuned ? 'auto-tune' : 'machine')}</td></tr>`)}</tbody></table></div></section>`;
 }
 

@@ -10,7 +10,8 @@ import { Icon, Field, useLive, sentence } from '../parts.js';
 
 const WORDS = ['fault_machine', 'fault_web_break', 'fault_drum_wear', 'fault_eccentricity_uw', 'fault_sensors', 'fault_wrap_angle', 'fault_load_cell_drift', 'fault_drives', 'fault_preset', 'bus_delay'];
 const GROUPS = [
-  ['Web and rolls', ['fault_web_break', 'fault_drum_wear', 'fault_eccentricity_uw', 'fault_machine']],
+  ['Web and rolls', ['fault_web_break', 'fault_drum_wear', 'fault_eccentricity_uw']],
+  ['Brakes and paper', ['fault_machine']],
   ['Sensors', ['fault_sensors', 'fault_wrap_angle', 'fault_load_cell_drift']],
   ['Drives', ['fault_drives', 'fault_preset', 'bus_delay']],
 ];

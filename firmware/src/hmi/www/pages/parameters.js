@@ -42,6 +42,8 @@ function title(part) {
 
 /** A number with as many digits as it has. */
 const plain = (v) => (typeof v === 'number' ? String(Number(v.toPrecision(12))) : String(v));
+/** The same for reading: thin spaces every three digits of a long number. */
+const spaced = (v) => plain(v).replace(/^-?\d{5,}/, (whole) => whole.replace(/\B(?=(\d{3})+$)/g, '\u2009')).replace('-', '\u2212');
 const same = (a, b) => a === b || (typeof a === 'number' && Math.abs(a - b) <= 1e-12 * Math.abs(b));
 
 /** Why a value cannot be, or nothing. */
@@ -116,8 +118,8 @@ function Row({ p, error, locked, onstage }) {
           : html`<input type="text" inputmode="decimal" aria-label=${label} aria-invalid=${reason ? 'true' : undefined} aria-describedby=${reason ? p.name : undefined} value=${shown} disabled=${locked}
               onInput=${(e) => setEntry(e.target.value.replace(',', '.'))} onBlur=${commit} onKeyDown=${(e) => (e.key === 'Enter' ? commit() : e.key === 'Escape' ? setEntry(null) : null)} /><i>${unit}</i>`}
     </div>
-    <div class="range">${p.kind === 'number' ? html`<span>${plain(p.low)} … ${plain(p.high)}</span>` : html`<span />`}<span>default ${plain(p.default)}</span></div>
-    <div class="change">${changed ? html`<span>was ${plain(p.value)}</span>` : ''}
+    <div class="range">${p.kind === 'number' ? html`<span>${spaced(p.low)} … ${spaced(p.high)}</span>` : html`<span />`}<span>default ${p.kind === 'switch' ? (p.default ? 'on' : 'off') : spaced(p.default)}</span></div>
+    <div class="change">${changed ? html`<span>was ${spaced(p.value)}</span>` : ''}
       ${!same(now, p.default) ? html`<button type="button" class="plain" disabled=${locked} aria-label=${`${p.name}: back to its default`} title="Back to its default" onClick=${() => onstage({ [p.name]: p.default })}><${Icon} name="undo" /></button>` : ''}</div>
     ${reason ? html`<p class="reason" id=${p.name} role="alert">${reason}</p>` : null}
   </li>`;
@@ -236,7 +238,7 @@ export default function Parameters() {
       ? html`<${Dialog} title="Apply as one" onclose=${() => setOpen(null)}>
           <p>The winder is built anew with these values, at standstill: new core, full parent roll, no web.</p>
           <div class="scroll"><table><thead><tr><th>Parameter</th><th class="n">Now</th><th class="n">New</th><th>Unit</th></tr></thead>
-            <tbody>${changes.map((p) => html`<tr key=${p.name}><td><code>${p.name}</code></td><td class="n">${plain(p.value)}</td><td class="n"><b>${plain(p.staged)}</b></td><td>${p.unit}</td></tr>`)}</tbody></table></div>
+            <tbody>${changes.map((p) => html`<tr key=${p.name}><td><code>${p.name}</code></td><td class="n">${spaced(p.value)}</td><td class="n"><b>${spaced(p.staged)}</b></td><td>${p.unit}</td></tr>`)}</tbody></table></div>
           <div class="row end"><button type="button" onClick=${() => setOpen(null)}>Not yet</button><button type="button" class="main" onClick=${apply}>Apply</button></div><//>`
       : null}
     ${open === 'presets'

@@ -59,7 +59,7 @@ export default function Session() {
       <section class="card events"><div class="head"><h2>Events</h2>
           <div class="row" role="group" aria-label="Kinds of events">${KINDS.map((k) => html`<label key=${k} class="tick"><input type="checkbox" checked=${!hidden.includes(k)} onChange=${() => hide(hidden.includes(k) ? hidden.filter((o) => o !== k) : [...hidden, k])} /> ${k}</label>`)}</div></div>
         <div class="scroll"><table><thead><tr><th class="n">Time</th><th>Kind</th><th>What</th></tr></thead><tbody>
-          ${shown.map((e) => html`<tr key=${e.n} class=${e.kind}><td class="n mono">${span(e.cycle * CYCLE_S)}.${String(e.cycle % 100).padStart(2, '0')}</td><td>${e.kind === 'fault' ? html`<b class="failed">◆ fault</b>` : e.kind === 'refusal' ? html`<b class="warned">▲ refusal</b>` : e.kind}</td><td>${sentence(e.text)}</td></tr>`)}
+          ${shown.map((e) => html`<tr key=${e.n}><td class="n mono">${span(e.cycle * CYCLE_S)}.${String(e.cycle % 100).padStart(2, '0')}</td><td>${e.kind === 'fault' ? html`<b class="failed">◆ fault</b>` : e.kind === 'refusal' ? html`<b class="warned">▲ refusal</b>` : e.kind}</td><td>${sentence(e.text)}</td></tr>`)}
           ${shown.length ? null : html`<tr><td colspan="3" class="quiet">Nothing has happened yet.</td></tr>`}</tbody></table></div></section>
     </div>`;
 }

@@ -173,7 +173,7 @@ export default function Trends() {
       box.current,
     );
     plot.current = made;
-    const fit = new ResizeObserver(() => made.setSize(size()));
+    const fit = new ResizeObserver(() => box.current && made.setSize(size()));
     fit.observe(box.current);
     draw(true);
     return () => (fit.disconnect(), made.destroy(), (plot.current = null));
