@@ -43,13 +43,18 @@ async function request(method, path, body) {
 /** Reads. */
 export const get = (path) => request('GET', path);
 
-/** Writes. Asks for the password where it is missing, then writes again. */
+/** Nobody gave the password that was asked for. */
+const CANCELLED = 401;
+
+/** Writes. Asks for the password first where it is missing, and again when the session has ended. */
 export async function write(method, path, body) {
+  const open = path === 'login' || path === 'password';
+  if (!open && info.value?.auth?.logged_in === false && !(await login())) throw new ApiError(CANCELLED, { error: 'not logged in' });
   for (;;) {
     try {
       return await request(method, path, body);
     } catch (error) {
-      if (error.status !== 401 || /^(login|password)$/.test(path) || !(await login())) throw error;
+      if (error.status !== 401 || open || !(await login())) throw error;
     }
   }
 }
@@ -59,9 +64,9 @@ export function login() {
   asking.value?.resolve(false);
   return new Promise((resolve) => {
     asking.value = {
-      resolve(done) {
+      async resolve(done) {
         asking.value = null;
-        if (done) refresh();
+        if (done) await refresh();
         resolve(done);
       },
     };
@@ -82,7 +87,7 @@ export async function attempt(method, path, body, done) {
     if (done) note(done);
     return true;
   } catch (error) {
-    note(error.message + error.details.map((d) => `: ${detail(d)}`).join(''), true);
+    if (error.status !== CANCELLED) note(error.message + error.details.map((d) => `: ${detail(d)}`).join(''), true);
     return false;
   }
 }

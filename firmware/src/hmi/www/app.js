@@ -194,7 +194,7 @@ function Password() {
     <form onSubmit=${submit}>
       <p>${first ? 'Nobody has set one yet. From now on it is asked for before anything is changed.' : 'Changes need the password.'}</p>
       <input type="text" name="user" autocomplete="username" value="winder" hidden aria-hidden="true" tabindex="-1" />
-      <${Field} label="Password" error=${error}>${(a) => html`<input ...${a} type="password" name="password" required autofocus
+      <${Field} label="Password" error=${error}>${(a) => html`<input ...${a} type="password" name="password" required
         autocomplete=${first ? 'new-password' : 'current-password'} />`}<//>
       ${first ? html`<${Field} label="Once more">${(a) => html`<input ...${a} type="password" name="again" required autocomplete="new-password" />`}<//>` : null}
       <div class="row end"><button type="button" onClick=${() => asking.value?.resolve(false)}>Cancel</button>

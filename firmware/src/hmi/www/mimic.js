@@ -329,7 +329,7 @@ class Scene {
     this.text('t', tx, ty, `${figure(now.tension, 0)} N/m`, 'end', `big ${kind}`);
     this.text('sl', kx + kr * 2.1, ky + 4, narrow ? '' : 'Slitter', 'start', 'name');
     this.text('rr', rider.x + 2.2 * rider.r + 8, top + 4, narrow ? '' : now.down ? 'Rider roll' : 'Rider roll lifted', 'start', 'name');
-    this.text('torn', torn ? torn[0] + 16 : 0, torn ? torn[1] - 12 : 0, torn ? 'Web break' : '', 'start', 'big broken');
+    this.text('torn', torn ? torn[0] + 16 : 0, torn ? torn[1] + 24 : 0, torn ? 'Web break' : '', 'start', 'big broken');
   }
 
   /** Layers of paper: rings that stay where they are wound as the roll grows. */

@@ -59,7 +59,7 @@ function Tile({ label, name, reference, low, high, at, children, kind }) {
 function Tiles({ of }) {
   const t = value('tension');
   const r = value('tension_ref');
-  const odd = r > 1 && Math.abs(t / r - 1) > 0.15 ? (t > r ? 'high' : 'low') : '';
+  const odd = bit('winder_status', 'web_threaded') && r > 1 && Math.abs(t / r - 1) > 0.15 ? (t > r ? 'high' : 'low') : '';
   const fast = (of.get('operation.max_speed_m_s') ?? 41.7) * 60;
   const tight = (of.get('operation.tension_n_m') ?? 350) * 1.6;
   return html`<section class="tiles" aria-label="Key values">
