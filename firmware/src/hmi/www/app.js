@@ -155,7 +155,7 @@ function Alarm() {
   const warnings = signals.value.get('warnings')?.bits.filter((b) => (counts('warnings').value >> b.number) & 1) ?? [];
   const acknowledge = () => attempt('POST', 'panel', { action: 'acknowledge' });
   const plc = info.value?.control?.by === 'plc';
-  return html`<div class="alarms" role="status" aria-live="assertive">
+  return html`<div class=${`alarms ${state.value}`} role="status" aria-live="assertive">
     ${state.value === 'lost'
       ? html`<p class="alarm stale"><svg class="icon" viewBox="0 0 24 24" aria-hidden="true"><path d="M12 7v6m0 3v1M12 21a9 9 0 1 0 0-18 9 9 0 0 0 0 18Z" /></svg>
           <span><b>No data from the simulator.</b> The values are the last ones that came. Trying again …</span></p>`

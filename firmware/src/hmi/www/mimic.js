@@ -302,7 +302,7 @@ class Scene {
       const o = closed ? 0 : Math.max(3, r * 0.16);
       const [bw, bh] = [Math.max(5, r * 0.3), Math.max(9, r * 0.72)];
       const shoe = (x) => `M${round(x)} ${round(c.y - bh / 2)}h${round(bw)}v${round(bh)}h${round(-bw)}Z`;
-      set(path_, { d: shoe(c.x - r - o - bw * 0.5) + shoe(c.x + r + o - bw * 0.5), class: `brake ${closed ? 'closed' : ''}` });
+      set(path_, { d: shoe(c.x - r - o - bw * 0.5) + shoe(c.x + r + o - bw * 0.5), class: `brake ${name} ${closed ? 'closed' : ''}` });
     }
 
     // labels in the picture; the same values stand as text beside it

@@ -5,8 +5,8 @@
  */
 import { html, useState, useEffect, signal } from '../vendor/ui.js';
 import { info, attempt, get } from '../api.js';
-import { counts, value, bit, figure, history, listeners, CYCLE_S } from '../live.js';
-import { Num, Bar, Lamp, Field, SECTIONS, useGet, span } from '../parts.js';
+import { signals, counts, value, bit, figure, history, listeners, CYCLE_S } from '../live.js';
+import { Num, Bar, Lamp, Field, Switch, SECTIONS, useGet, useLive, span } from '../parts.js';
 import { Mimic, geometry } from '../mimic.js';
 
 /** The machine's parameters by name; of which revision. */
@@ -118,6 +118,40 @@ const STATE = {
   tuning: [-1, ['stop']],
 };
 
+/** Set-points that a set rarely needs changed. */
+const MORE = [
+  ['tension_set', 'Web tension'],
+  ['v_thread_set', 'Thread speed'],
+  ['rider_load_set', 'Rider load'],
+];
+
+/** A set-point of the panel: what stands in the image until somebody writes another one. */
+function Setpoint({ name, label, disabled }) {
+  const [entry, set] = useState(null);
+  const about = signals.value.get(name);
+  if (!about) return null;
+  const n = Number(entry);
+  const bad = entry === null ? '' : entry.trim() === '' || !Number.isFinite(n) ? 'a number, please' : n < about.low || n > about.high ? `${about.low} to ${about.high} ${about.unit}` : '';
+  const commit = async () => {
+    if (entry === null || bad) return;
+    await attempt('POST', 'commands', { [name]: Math.round(n * about.counts) });
+    set(null);
+  };
+  const now = value(name);
+  return html`<${Field} label=${label} unit=${about.unit} error=${bad}>${(a) => html`<input ...${a} type="number" step="any" disabled=${disabled}
+    value=${entry ?? (Number.isFinite(now) ? now : '')} onInput=${(e) => set(e.target.value)} onBlur=${commit} onKeyDown=${(e) => e.key === 'Enter' && commit()} />`}<//>`;
+}
+
+function More({ mine }) {
+  useLive([...MORE.map(([name]) => name), 'winder_command_2']);
+  const write = (name, on) => attempt('POST', 'commands', { [`winder_command_2.${name}`]: on ? 1 : 0 });
+  return html`<details class="more"><summary>Tension, rider roll</summary>
+    <div class="entries">${MORE.map(([name, label]) => html`<${Setpoint} key=${name} name=${name} label=${label} disabled=${!mine} />`)}</div>
+    <${Switch} on=${bit('winder_command_2', 'rider_up')} disabled=${!mine} label="Rider roll lifted" onchange=${(on) => write('rider_up', on)} />
+    <${Switch} on=${!bit('winder_command_2', 'tension_control_off')} disabled=${!mine} label="Tension loop closed" onchange=${(on) => write('tension_control_off', !on)} />
+  </details>`;
+}
+
 function Panel({ of }) {
   const [panel, , again] = useGet('panel', 500);
   const [goal, setGoal] = useState('diameter');
@@ -179,6 +213,7 @@ function Panel({ of }) {
       })}
     </ol>
     ${done !== null && at >= 2 ? html`<p class="goal"><progress max="1" value=${Math.min(1, done || 0)} aria-label="The set" /><span>${figure(100 * Math.min(1, done || 0), 0)} % of ${target.diameter_mm ? `${figure(target.diameter_mm, 0)} mm` : `${figure(target.length_m, 0)} m`}${left(of, target, done)}</span></p>` : null}
+    <${More} mine=${mine} />
     <p class="message" aria-live="polite">${panel?.message || ''}</p>
     <div class="row spread">
       <button type="button" disabled=${!mine || !standing} onClick=${() => act('new_set')}>New set</button>
