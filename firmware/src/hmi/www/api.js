@@ -49,7 +49,8 @@ const CANCELLED = 401;
 /** Writes. Asks for the password first where it is missing, and again when the session has ended. */
 export async function write(method, path, body) {
   const open = path === 'login' || path === 'password';
-  if (!open && info.value?.auth?.logged_in === false && !(await login())) throw new ApiError(CANCELLED, { error: 'not logged in' });
+  if (!open && info.value?.auth?.logged_in === false && !(await login()))
+    throw new ApiError(CANCELLED, { error: 'not logged in' });
   for (;;) {
     try {
       return await request(method, path, body);

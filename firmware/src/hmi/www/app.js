@@ -79,9 +79,14 @@ function Page({ id }) {
 function Control() {
   const control = info.value?.control;
   const by = control?.by;
-  const words = { plc: ['PLC', control?.plc || ''], panel: ['Panel', 'this page commands'], nobody: ['No control', 'nobody commands'] };
+  const words = {
+    plc: ['PLC', control?.plc || ''],
+    panel: ['Panel', 'this page commands'],
+    nobody: ['No control', 'nobody commands'],
+  };
   const [short, long] = words[by] ?? ['…', ''];
-  return html`<span class=${`control by-${by}`} title=${`${short} ${long}`}><i>Control</i><b>${short}</b><span>${by === 'plc' ? long : ''}</span></span>`;
+  return html`<span class=${`control by-${by}`} title=${`${short} ${long}`}><i>Control</i><b>${short}</b><span>
+    ${by === 'plc' ? long : ''}</span></span>`;
 }
 
 const LINK = { waiting: 'connecting', live: 'live', lost: 'no data' };
@@ -93,14 +98,16 @@ function Top() {
   const logged = info.value?.auth?.logged_in;
   return html`<header class="top">
     <a class="brand" href="#/machine" aria-label="Winder simulator, machine page">
-      <svg class="logo" viewBox="0 0 32 32" aria-hidden="true"><circle cx="16" cy="11" r="9" /><circle cx="16" cy="11" r="2.5" /><circle cx="8.5" cy="25" r="5" /><circle cx="23.5" cy="25" r="5" /></svg>
+      <svg class="logo" viewBox="0 0 32 32" aria-hidden="true"><circle cx="16" cy="11" r="9" />
+        <circle cx="16" cy="11" r="2.5" /><circle cx="8.5" cy="25" r="5" /><circle cx="23.5" cy="25" r="5" /></svg>
       <b>Winder</b></a>
     <span class="tag sim">Simulated</span>
     <span class="mode" aria-live="polite"><i>Mode</i><b>${mode === null ? '…' : sentence(code('mode'))}</b></span>
     <${Control} />
     <span class="stream ${state.value}"><${Lamp} on=${state.value === 'live'} kind="ok">${LINK[state.value]}<//></span>
     <span class="tools">
-      <button type="button" class="plain" title=${`Colours: ${theme.value}`} aria-label=${`Colours: ${theme.value}; change`}
+      <button type="button" class="plain" title=${`Colours: ${theme.value}`}
+        aria-label=${`Colours: ${theme.value}; change`}
         onClick=${() => (theme.value = next[theme.value])}><${Icon} name=${sign[theme.value]} /></button>
       <${Account} logged=${logged} />
     </span>
@@ -119,19 +126,25 @@ function Account({ logged }) {
     route();
     set(false);
   };
-  return html`<button type="button" class="plain" aria-label="Access" title="Access" onClick=${() => set(true)}><${Icon} name="key" /></button>
-    ${open
-      ? html`<${Dialog} title="Access" onclose=${() => set(false)}>
+  return html`<button type="button" class="plain" aria-label="Access" title="Access" onClick=${() => set(true)}>
+    <${Icon} name="key" /></button>
+    ${
+      open
+        ? html`<${Dialog} title="Access" onclose=${() => set(false)}>
           <p>${logged ? 'You are logged in: this page may change things.' : 'Everybody may look. Changes need the password.'}</p>
           <div class="row">
-            ${logged
-              ? html`<button type="button" onClick=${async () => (await attempt('POST', 'logout', {}, 'Logged out')) && (refresh(), set(false))}>Log out</button>`
-              : html`<button type="button" class="main" onClick=${() => (set(false), login())}>Log in</button>`}
+            ${
+              logged
+                ? html`<button type="button"
+                  onClick=${async () => (await attempt('POST', 'logout', {}, 'Logged out')) && (refresh(), set(false))}>Log out</button>`
+                : html`<button type="button" class="main" onClick=${() => (set(false), login())}>Log in</button>`
+            }
             <button type="button" onClick=${leave}>${trainee.value ? 'Leave the trainee view' : 'Trainee view'}</button>
           </div>
           <p class="quiet">The trainee view shows no faults that are put in, and no snapshots. Leaving it takes the password.</p>
         <//>`
-      : null}`;
+        : null
+    }`;
 }
 
 /** The way between the pages; on a narrow screen it scrolls, and the present one is in sight. */
@@ -143,7 +156,8 @@ function Pages() {
     list.current.scrollLeft = one.offsetLeft - (list.current.clientWidth - one.clientWidth) / 2;
   }, [at]);
   return html`<nav class="pages" aria-label="Pages" ref=${list}>
-    ${shown().map(([id, name]) => html`<a key=${id} href=${`#/${id}`} aria-current=${at === id ? 'page' : undefined}><${Icon} name=${id} /><span>${name}</span></a>`)}
+    ${shown().map(([id, name]) => html`<a key=${id} href=${`#/${id}`} aria-current=${at === id ? 'page' : undefined}>
+      <${Icon} name=${id} /><span>${name}</span></a>`)}
   </nav>`;
 }
 
@@ -156,15 +170,23 @@ function Alarm() {
   const acknowledge = () => attempt('POST', 'panel', { action: 'acknowledge' });
   const plc = info.value?.control?.by === 'plc';
   return html`<div class=${`alarms ${state.value}`} role="status" aria-live="assertive">
-    ${state.value === 'lost'
-      ? html`<p class="alarm stale"><svg class="icon" viewBox="0 0 24 24" aria-hidden="true"><path d="M12 7v6m0 3v1M12 21a9 9 0 1 0 0-18 9 9 0 0 0 0 18Z" /></svg>
+    ${
+      state.value === 'lost'
+        ? html`<p class="alarm stale"><svg class="icon" viewBox="0 0 24 24" aria-hidden="true">
+          <path d="M12 7v6m0 3v1M12 21a9 9 0 1 0 0-18 9 9 0 0 0 0 18Z" /></svg>
           <span><b>No data from the simulator.</b> The values are the last ones that came. Trying again …</span></p>`
-      : null}
-    ${fault
-      ? html`<p class="alarm bad"><${Icon} name="faults" /><span><b>Fault ${fault}</b> ${code('fault')}${broken && fault !== 2 ? '; web break' : ''}</span>
-          ${plc ? html`<i>the PLC acknowledges</i>` : html`<button type="button" onClick=${acknowledge}>Acknowledge</button>`}</p>`
-      : null}
-    ${warnings.map((w) => html`<p class="alarm warn" key=${w.name}><${Icon} name="faults" /><span><b>Warning</b> ${w.description}</span></p>`)}
+        : null
+    }
+    ${
+      fault
+        ? html`<p class="alarm bad"><${Icon} name="faults" /><span><b>Fault ${fault}
+          </b> ${code('fault')}${broken && fault !== 2 ? '; web break' : ''}</span>
+          ${plc ? html`<i>the PLC acknowledges</i>` : html`<button type="button"
+            onClick=${acknowledge}>Acknowledge</button>`}</p>`
+        : null
+    }
+    ${warnings.map((w) => html`<p class="alarm warn" key=${w.name}><${Icon} name="faults" /><span>
+      <b>Warning</b> ${w.description}</span></p>`)}
     ${refusal && !fault ? html`<p class="alarm info"><span><b>Refused</b> ${code('refusal')}</span></p>` : null}
   </div>`;
 }
@@ -190,13 +212,15 @@ function Password() {
     }
     work(false);
   };
-  return html`<${Dialog} title=${first ? 'Choose a password' : 'Password'} onclose=${() => asking.value?.resolve(false)}>
+  return html`<${Dialog} title=${first ? 'Choose a password' : 'Password'}
+    onclose=${() => asking.value?.resolve(false)}>
     <form onSubmit=${submit}>
       <p>${first ? 'Nobody has set one yet. From now on it is asked for before anything is changed.' : 'Changes need the password.'}</p>
       <input type="text" name="user" autocomplete="username" value="winder" hidden aria-hidden="true" tabindex="-1" />
       <${Field} label="Password" error=${error}>${(a) => html`<input ...${a} type="password" name="password" required
         autocomplete=${first ? 'new-password' : 'current-password'} />`}<//>
-      ${first ? html`<${Field} label="Once more">${(a) => html`<input ...${a} type="password" name="again" required autocomplete="new-password" />`}<//>` : null}
+      ${first ? html`<${Field} label="Once more">
+        ${(a) => html`<input ...${a} type="password" name="again" required autocomplete="new-password" />`}<//>` : null}
       <div class="row end"><button type="button" onClick=${() => asking.value?.resolve(false)}>Cancel</button>
         <button type="submit" class="main" disabled=${busy}>${first ? 'Set password' : 'Log in'}</button></div>
     </form><//>`;
@@ -206,7 +230,8 @@ function App() {
   return html`<${Top} /><${Alarm} />
     <${Pages} />
     <main id="main" class=${`page-${page.value}`} tabindex="-1"><${Page} id=${page.value} /></main>
-    <div class="notes" role="status" aria-live="polite">${notes.value.map((n) => html`<p class=${n.bad ? 'bad' : ''}>${n.text}</p>`)}</div>
+    <div class="notes" role="status" aria-live="polite">${notes.value.map((n) => html`<p class=${n.bad ? 'bad' : ''}>
+      ${n.text}</p>`)}</div>
     ${asking.value ? html`<${Password} />` : null}`;
 }
 

@@ -3,7 +3,7 @@
  *
  * Not here: drawing. Values stay raw counts until somebody looks at them, so that what is exported is what came.
  */
-import { signal, computed, effect } from './vendor/ui.js';
+import { signal, computed } from './vendor/ui.js';
 import { get } from './api.js';
 
 /** Every signal by its name; empty before the list has come. */
@@ -23,12 +23,11 @@ const ROWS = 600 * RATE;
 const SILENCE = 3000;
 
 /** What every page needs, and what trends show of the time before they were opened. */
-const ALWAYS = [
-  'mode', 'fault', 'refusal', 'winder_status', 'warnings', 'broken_span',
-  'v_web', 'v_ref', 'a_ref', 'tension', 'tension_ref', 'd_uw', 'd_wu', 'length_wu', 'n_uw', 'n_rd', 'n_fd', 'n_rr',
-  'torque_uw', 'torque_rd', 'torque_fd', 'torque_rr', 'power_uw', 'power_rd', 'power_fd', 'power_rr',
-  'zsw1_uw', 'zsw1_rd', 'zsw1_fd', 'zsw1_rr', 'rider_load',
-];
+const ALWAYS = (
+  'mode fault refusal winder_status warnings broken_span v_web v_ref a_ref tension tension_ref d_uw ' +
+  'd_wu length_wu n_uw n_rd n_fd n_rr torque_uw torque_rd torque_fd torque_rr power_uw power_rd ' +
+  'power_fd power_rr zsw1_uw zsw1_rd zsw1_fd zsw1_rr rider_load'
+).split(' ');
 
 const cells = new Map();
 /** The counts of a signal, as a signal of the page. */
@@ -205,6 +204,3 @@ export async function start() {
   }
   ask();
 }
-
-/** Does something whenever its signals change; for what is not drawn by a component. */
-export { effect };

@@ -190,7 +190,13 @@ class Scene {
       // the last roll leads the web up to the drum from below, the others go over and under
       const over = (g.idle.length - 1 - i) % 2 === 1;
       const x = from + (to - from) * (g.idle.length === 1 ? 0.8 : along / total);
-      return { x: X(x), y: Y(over ? g.full * 0.8 : g.full * 0.26 + one.r), r: one.r * scale, s: over ? 1 : -1, r_m: one.r };
+      return {
+        x: X(x),
+        y: Y(over ? g.full * 0.8 : g.full * 0.26 + one.r),
+        r: one.r * scale,
+        s: over ? 1 : -1,
+        r_m: one.r,
+      };
     });
     const parent = { x: X(x_uw), y: Y(axis), r: r_uw * scale, s: 1 };
     const rear = { x: X(x_rd), y: Y(drum), r: g.rd * scale, s: 1 };
@@ -211,7 +217,9 @@ class Scene {
         rolls.map((c) => `M${round(c.x)} ${floor}V${round(c.y)}`).join(''),
     });
     const top = Y(stack);
-    set(this.beam, { d: `M${round(rider.x - 2.2 * rider.r)} ${round(top)}h${round(4.4 * rider.r)}M${round(rider.x)} ${round(top)}V${round(rider.y)}` });
+    set(this.beam, {
+      d: `M${round(rider.x - 2.2 * rider.r)} ${round(top)}h${round(4.4 * rider.r)}M${round(rider.x)} ${round(top)}V${round(rider.y)}`,
+    });
 
     // rolls
     const per_minute = (2 * Math.PI) / 60;
@@ -244,7 +252,15 @@ class Scene {
     set(this.ghost, { d: path, visibility: now.threaded ? 'hidden' : 'visible' });
     const ratio = now.tension_ref > 1 ? now.tension / now.tension_ref : now.tension > 5 ? 1 : 0;
     const slack = Math.max(0, 1 - ratio / (1 - USUAL));
-    const kind = now.broken ? 'broken' : !now.threaded ? 'usual' : ratio > 1 + USUAL ? 'high' : slack > 0 ? 'low' : 'usual';
+    const kind = now.broken
+      ? 'broken'
+      : !now.threaded
+        ? 'usual'
+        : ratio > 1 + USUAL
+          ? 'high'
+          : slack > 0
+            ? 'low'
+            : 'usual';
     while (this.spans.length > lines.length) this.spans.pop().remove();
     while (this.spans.length < lines.length) this.spans.push(node(this.web, 'path'));
     set(this.web, { class: `web ${kind}`, visibility: now.threaded || now.broken ? 'visible' : 'hidden' });
@@ -261,7 +277,8 @@ class Scene {
         const drop = Math.min(0.25 * length, 0.3 * g.full * scale);
         torn = middle;
         set(this.spans[i], {
-          d: `${start}Q${point(at(0.3, 0))} ${point(at(0.36, drop))}M${point(at(0.64, drop))}Q${point(at(0.7, 0))} ${point(b)}` +
+          d:
+            `${start}Q${point(at(0.3, 0))} ${point(at(0.36, drop))}M${point(at(0.64, drop))}Q${point(at(0.7, 0))} ${point(b)}` +
             (last ? arc(rear, b, nip) : ''),
         });
         return;
@@ -279,7 +296,10 @@ class Scene {
     });
     if (torn) {
       const [x, y, s] = [torn[0], torn[1], 9];
-      set(this.torn, { d: `M${x - s} ${y - s}l${2 * s} ${2 * s}M${x + s} ${y - s}l${-2 * s} ${2 * s}`, visibility: 'visible' });
+      set(this.torn, {
+        d: `M${x - s} ${y - s}l${2 * s} ${2 * s}M${x + s} ${y - s}l${-2 * s} ${2 * s}`,
+        visibility: 'visible',
+      });
     } else set(this.torn, { visibility: 'hidden' });
 
     // slitter behind the roll on the load cells, or before it when it is the last
@@ -287,12 +307,19 @@ class Scene {
     const [kx, ky] = [cut[0][0] + (cut[1][0] - cut[0][0]) * 0.42, cut[0][1] + (cut[1][1] - cut[0][1]) * 0.42];
     const along_ = Math.atan2(cut[1][1] - cut[0][1], cut[1][0] - cut[0][0]);
     const kr = Math.max(4, 0.085 * g.full * scale);
-    const side = (f) => ({ cx: round(kx + f * kr * 0.86 * Math.sin(along_)), cy: round(ky - f * kr * 0.86 * Math.cos(along_)), r: round(kr) });
+    const side = (f) => ({
+      cx: round(kx + f * kr * 0.86 * Math.sin(along_)),
+      cy: round(ky - f * kr * 0.86 * Math.cos(along_)),
+      r: round(kr),
+    });
     set(this.upper, side(1));
     set(this.lower, side(-1));
     const on = rolls[Math.min(g.cells, rolls.length - 1)] ?? rear;
     const t = Math.max(5, on.r * 0.5);
-    set(this.cell, { d: `M${round(on.x)} ${round(on.y + on.r + 2)}l${t} ${1.5 * t}h${-2 * t}Z`, class: `cell ${kind}` });
+    set(this.cell, {
+      d: `M${round(on.x)} ${round(on.y + on.r + 2)}l${t} ${1.5 * t}h${-2 * t}Z`,
+      class: `cell ${kind}`,
+    });
 
     // brakes: shoes at the rolls, filled when closed
     for (const [name, path_] of this.brakes) {
@@ -302,7 +329,10 @@ class Scene {
       const o = closed ? 0 : Math.max(3, r * 0.16);
       const [bw, bh] = [Math.max(5, r * 0.3), Math.max(9, r * 0.72)];
       const shoe = (x) => `M${round(x)} ${round(c.y - bh / 2)}h${round(bw)}v${round(bh)}h${round(-bw)}Z`;
-      set(path_, { d: shoe(c.x - r - o - bw * 0.5) + shoe(c.x + r + o - bw * 0.5), class: `brake ${name} ${closed ? 'closed' : ''}` });
+      set(path_, {
+        d: shoe(c.x - r - o - bw * 0.5) + shoe(c.x + r + o - bw * 0.5),
+        class: `brake ${name} ${closed ? 'closed' : ''}`,
+      });
     }
 
     // labels in the picture; the same values stand as text beside it
@@ -311,7 +341,14 @@ class Scene {
     this.text('uw', parent.x, floor + 16, narrow ? 'UW' : 'Unwind', 'middle', 'name');
     this.text('rd', rear.x, floor + 16, narrow ? 'RD' : 'Rear drum', 'middle', 'name');
     this.text('fd', front.x, floor + 16, narrow ? 'FD' : 'Front drum', 'middle', 'name');
-    this.text('duw', parent.x, parent.y - g.spool * scale - (r_uw - g.spool) * scale * 0.36, r_uw * scale > 55 ? mm(now.d_uw) : '', 'middle', 'on');
+    this.text(
+      'duw',
+      parent.x,
+      parent.y - g.spool * scale - (r_uw - g.spool) * scale * 0.36,
+      r_uw * scale > 55 ? mm(now.d_uw) : '',
+      'middle',
+      'on',
+    );
     // a narrow picture has no room beside its rolls: what has no place is above
     const label = ship.r > 46;
     this.text(
@@ -328,7 +365,14 @@ class Scene {
     this.text('v', vx, vy, `${figure(now.v, 0)} m/min`, small ? 'end' : 'start', 'big');
     this.text('t', tx, ty, `${figure(now.tension, 0)} N/m`, 'end', `big ${kind}`);
     this.text('sl', kx + kr * 2.1, ky + 4, narrow ? '' : 'Slitter', 'start', 'name');
-    this.text('rr', rider.x + 2.2 * rider.r + 8, top + 4, narrow ? '' : now.down ? 'Rider roll' : 'Rider roll lifted', 'start', 'name');
+    this.text(
+      'rr',
+      rider.x + 2.2 * rider.r + 8,
+      top + 4,
+      narrow ? '' : now.down ? 'Rider roll' : 'Rider roll lifted',
+      'start',
+      'name',
+    );
     this.text('torn', torn ? torn[0] + 16 : 0, torn ? torn[1] + 24 : 0, torn ? 'Web break' : '', 'start', 'big broken');
   }
 
@@ -356,7 +400,11 @@ function present() {
     threaded: bit('winder_status', 'web_threaded'),
     down: state.value === 'waiting' || bit('winder_status', 'rider_down'),
     broken: counts('broken_span').value || 0,
-    brake: { uw: bit('winder_status', 'brake_uw'), rd: bit('winder_status', 'brake_rd'), fd: bit('winder_status', 'brake_fd') },
+    brake: {
+      uw: bit('winder_status', 'brake_uw'),
+      rd: bit('winder_status', 'brake_rd'),
+      fd: bit('winder_status', 'brake_fd'),
+    },
   }));
 }
 
@@ -390,5 +438,6 @@ export function Mimic({ machine }) {
       svg.replaceChildren();
     };
   }, []);
-  return html`<svg class="scene" ref=${box} role="img" aria-label="The winder: parent roll, web path, drums, shipping roll and rider roll, moving as they do" />`;
+  return html`<svg class="scene" ref=${box} role="img"
+    aria-label="The winder: parent roll, web path, drums, shipping roll and rider roll, moving as they do" />`;
 }

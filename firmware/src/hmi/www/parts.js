@@ -10,7 +10,8 @@ import { get } from './api.js';
 const PATHS = {
   machine: 'M2 15h20M6 12a4 4 0 1 0 0-8 4 4 0 0 0 0 8Zm11 0a3 3 0 1 0 0-6 3 3 0 0 0 0 6ZM6 4h11M4 20h16',
   trends: 'M3 3v18h18M6 15l4-6 4 4 6-8',
-  parameters: 'M4 7h10m4 0h2M4 17h2m4 0h10M16 9.5a2.5 2.5 0 1 0 0-5 2.5 2.5 0 0 0 0 5ZM8 19.5a2.5 2.5 0 1 0 0-5 2.5 2.5 0 0 0 0 5Z',
+  parameters:
+    'M4 7h10m4 0h2M4 17h2m4 0h10M16 9.5a2.5 2.5 0 1 0 0-5 2.5 2.5 0 0 0 0 5ZM8 19.5a2.5 2.5 0 1 0 0-5 2.5 2.5 0 0 0 0 5Z',
   autotune: 'M4 19a9 9 0 1 1 16 0M12 14l5-5M12 16a2 2 0 1 0 0-4 2 2 0 0 0 0 4Z',
   drive: 'M13 2 5 14h6l-1 8 8-12h-6l1-8Z',
   faults: 'M12 3 2 20h20L12 3ZM12 10v4M12 17v.5',
@@ -80,7 +81,7 @@ export const Lamp = ({ on, kind = 'on', children }) =>
   html`<span class=${`lamp ${on ? kind : ''}`}><span class="dot" aria-hidden="true" />${children}</span>`;
 
 /** The bits of a word, each with what it means. */
-export function Bits({ name, zero = [] }) {
+export function Bits({ name }) {
   const about = signals.value.get(name);
   if (!about) return null;
   const word = counts(name).value ?? 0;
@@ -110,7 +111,8 @@ export function Dialog({ title, onclose, children }) {
     if (!box.current.open) box.current.showModal();
     return () => before?.focus?.();
   }, []);
-  return html`<dialog ref=${box} aria-labelledby=${id} onClose=${onclose} onClick=${(e) => e.target === box.current && onclose()}>
+  return html`<dialog ref=${box} aria-labelledby=${id} onClose=${onclose}
+    onClick=${(e) => e.target === box.current && onclose()}>
     <div class="inside"><h2 id=${id}>${title}</h2>${children}</div>
   </dialog>`;
 }
@@ -120,9 +122,10 @@ export function Field({ label, unit, error, children, hint }) {
   const id = useId();
   return html`<div class=${`field ${error ? 'bad' : ''}`}>
     <label for=${id}>${label}</label>
-    <span class="box">${children({ id, 'aria-invalid': error ? 'true' : undefined, 'aria-describedby': error || hint ? id + 'e' : undefined })}${unit
-      ? html`<i>${unit}</i>`
-      : null}</span>
+    <span class="box">
+      ${children({ id, 'aria-invalid': error ? 'true' : undefined, 'aria-describedby': error || hint ? id + 'e' : undefined })}${
+      unit ? html`<i>${unit}</i>` : null
+    }</span>
     ${error || hint ? html`<small id=${id + 'e'} role=${error ? 'alert' : undefined}>${error || hint}</small>` : null}
   </div>`;
 }
@@ -140,7 +143,9 @@ export function span(seconds) {
   if (!Number.isFinite(seconds)) return '–';
   const s = Math.floor(seconds);
   const two = (n) => String(n).padStart(2, '0');
-  return s >= 3600 ? `${Math.floor(s / 3600)}:${two(Math.floor(s / 60) % 60)}:${two(s % 60)}` : `${Math.floor(s / 60)}:${two(s % 60)}`;
+  return s >= 3600
+    ? `${Math.floor(s / 3600)}:${two(Math.floor(s / 60) % 60)}:${two(s % 60)}`
+    : `${Math.floor(s / 60)}:${two(s % 60)}`;
 }
 
 /** The names of the sections. */

@@ -47,19 +47,32 @@ export default function Session() {
   return html`<div class="head"><h1>Session</h1></div>
     <div class="session">
       <section class="card"><h2>Snapshot</h2>
-        <p>${has ? html`Taken at <b>${span(taken * CYCLE_S)}</b> of simulated time, cycle ${taken}.` : 'None has been taken.'}</p>
+        <p>${has ? html`Taken at <b>${span(taken * CYCLE_S)}
+          </b> of simulated time, cycle ${taken}.` : 'None has been taken.'}</p>
         <p class="quiet">The whole winder, its drives and their commands, as they are at one cycle. Restored, it goes on to the same bit.</p>
-        <div class="row"><button type="button" class="main" onClick=${() => act('snapshot', 'Snapshot taken')}>Take a snapshot</button>
-          <button type="button" disabled=${!has} onClick=${() => act('restore', 'Restored')}>Restore</button></div></section>
+        <div class="row"><button type="button" class="main"
+          onClick=${() => act('snapshot', 'Snapshot taken')}>Take a snapshot</button>
+          <button type="button" disabled=${!has} onClick=${() => act('restore', 'Restored')}>Restore</button></div>
+            </section>
       <section class="card"><h2>Recording</h2>
         <p>Every command with its cycle, since power-up or the snapshot. Now: cycle <b class="cycle">${cycle}</b>.</p>
         <p class="quiet">The file is what <code>cargo winder replay</code> reads.</p>
         <div class="row"><button type="button" onClick=${journal}>Save the recording</button>
-          <button type="button" disabled=${!has} onClick=${() => act('replay', 'Replaying from the snapshot')}>Replay from the snapshot</button></div></section>
+          <button type="button" disabled=${!has}
+            onClick=${() => act('replay', 'Replaying from the snapshot')}>Replay from the snapshot</button></div>
+              </section>
       <section class="card events"><div class="head"><h2>Events</h2>
-          <div class="row" role="group" aria-label="Kinds of events">${KINDS.map((k) => html`<label key=${k} class="tick"><input type="checkbox" checked=${!hidden.includes(k)} onChange=${() => hide(hidden.includes(k) ? hidden.filter((o) => o !== k) : [...hidden, k])} /> ${k}</label>`)}</div></div>
+          <div class="row" role="group" aria-label="Kinds of events">
+            ${KINDS.map((k) => html`<label key=${k} class="tick">
+              <input type="checkbox" checked=${!hidden.includes(k)}
+                onChange=${() => hide(hidden.includes(k) ? hidden.filter((o) => o !== k) : [...hidden, k])} /> ${k}
+                  </label>`)}</div></div>
         <div class="scroll"><table><thead><tr><th class="n">Time</th><th>Kind</th><th>What</th></tr></thead><tbody>
-          ${shown.map((e) => html`<tr key=${e.n}><td class="n mono">${span(e.cycle * CYCLE_S)}.${String(e.cycle % 100).padStart(2, '0')}</td><td>${e.kind === 'fault' ? html`<b class="failed">◆ fault</b>` : e.kind === 'refusal' ? html`<b class="warned">▲ refusal</b>` : e.kind}</td><td>${sentence(e.text)}</td></tr>`)}
-          ${shown.length ? null : html`<tr><td colspan="3" class="quiet">Nothing has happened yet.</td></tr>`}</tbody></table></div></section>
+          ${shown.map((e) => html`<tr key=${e.n}><td class="n mono">
+            ${span(e.cycle * CYCLE_S)}.${String(e.cycle % 100).padStart(2, '0')}</td><td>
+              ${e.kind === 'fault' ? html`<b class="failed">◆ fault</b>` : e.kind === 'refusal' ? html`<b
+                class="warned">▲ refusal</b>` : e.kind}</td><td>${sentence(e.text)}</td></tr>`)}
+          ${shown.length ? null : html`<tr><td colspan="3" class="quiet">Nothing has happened yet.</td></tr>`}</tbody>
+            </table></div></section>
     </div>`;
 }

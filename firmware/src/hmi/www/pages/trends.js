@@ -12,7 +12,10 @@ import { Icon, Field } from '../parts.js';
 document.head.append(Object.assign(document.createElement('link'), { rel: 'stylesheet', href: '/vendor/uplot.css' }));
 
 /** Colours that the colour-blind tell apart (Okabe and Ito), and a dash for the second round. */
-const COLOURS = { light: ['#0072b2', '#c24e00', '#007a5a', '#a8447f', '#8a6d00', '#2f8fc4', '#333333'], dark: ['#56b4e9', '#ff9a5c', '#3ecf9f', '#e59ac6', '#e6c84b', '#9fd3f5', '#eeeeee'] };
+const COLOURS = {
+  light: ['#0072b2', '#c24e00', '#007a5a', '#a8447f', '#8a6d00', '#2f8fc4', '#333333'],
+  dark: ['#56b4e9', '#ff9a5c', '#3ecf9f', '#e59ac6', '#e6c84b', '#9fd3f5', '#eeeeee'],
+};
 const DASHES = [[], [7, 4], [2, 3]];
 
 /** The paper's figures, and what else is looked at together. */
@@ -49,10 +52,13 @@ const dark = () => {
 /** A curve table: seconds and values in their units, of the pens' rows. */
 function table(pens, from, to) {
   const [cycles, ...columns] = history.rows(pens, from, to);
-  return [cycles.map((c) => c * CYCLE_S), ...columns.map((column, i) => {
-    const about = signals.value.get(pens[i]);
-    return column.map((raw) => (raw === null ? null : scaled(about, raw)));
-  })];
+  return [
+    cycles.map((c) => c * CYCLE_S),
+    ...columns.map((column, i) => {
+      const about = signals.value.get(pens[i]);
+      return column.map((raw) => (raw === null ? null : scaled(about, raw)));
+    }),
+  ];
 }
 
 /** The rows as CSV: cycle, time, and each pen in its unit with all its digits. */
@@ -61,7 +67,13 @@ export function csv(pens, from, to) {
   const head = ['cycle', 't_s', ...abouts.map((a) => (a.unit ? `${a.name} [${a.unit}]` : a.name))];
   const [cycles, ...columns] = history.rows(pens, from, to);
   const lines = cycles.map((c, i) =>
-    [c, (c * CYCLE_S).toFixed(2), ...columns.map((column, n) => (column[i] === null ? '' : scaled(abouts[n], column[i]).toFixed(digits(abouts[n]))))].join(','),
+    [
+      c,
+      (c * CYCLE_S).toFixed(2),
+      ...columns.map((column, n) =>
+        column[i] === null ? '' : scaled(abouts[n], column[i]).toFixed(digits(abouts[n])),
+      ),
+    ].join(','),
   );
   return [head.join(','), ...lines].join('\n') + '\n';
 }
@@ -73,13 +85,19 @@ function options(pens, width, height, hooks) {
   const units = [...new Set(pens.map((name) => signals.value.get(name)?.unit ?? ''))];
   const narrow = width < 560;
   const grid = { stroke: line, width: 1 };
-  const time = (u, ticks) => ticks.map((s) => (s < 0 ? '' : `${Math.floor(s / 60)}:${(s % 60).toFixed(s % 1 ? 1 : 0).padStart(s % 1 ? 4 : 2, '0')}`));
+  const time = (u, ticks) =>
+    ticks.map((s) =>
+      s < 0 ? '' : `${Math.floor(s / 60)}:${(s % 60).toFixed(s % 1 ? 1 : 0).padStart(s % 1 ? 4 : 2, '0')}`,
+    );
   return {
     width,
     height,
     legend: { show: false },
     cursor: { drag: { x: true, y: false, uni: 20 }, points: { size: 7 } },
-    scales: Object.fromEntries([['x', { time: false }], ...units.map((unit) => [unit || 'none', { range: (u, low, high) => room(low, high, unit) }])]),
+    scales: Object.fromEntries([
+      ['x', { time: false }],
+      ...units.map((unit) => [unit || 'none', { range: (u, low, high) => room(low, high, unit) }]),
+    ]),
     axes: [
       { stroke: text, grid, ticks: grid, font, values: time, size: 34 },
       ...units.map((unit, i) => ({
@@ -94,7 +112,8 @@ function options(pens, width, height, hooks) {
         labelFont: font,
         labelSize: 18,
         size: narrow ? 42 : 54,
-        values: (u, splits, axis, space, step) => splits.map((v) => (v === null ? '' : figure(v, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9))))),
+        values: (u, splits, axis, space, step) =>
+          splits.map((v) => (v === null ? '' : figure(v, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9))))),
       })),
     ],
     series: [
@@ -158,7 +177,14 @@ export default function Trends() {
     const size = () => ({ width: box.current.clientWidth, height: box.current.clientHeight });
     const made = new uPlot(
       options(pens, size().width, size().height, {
-        setCursor: [(u) => setCursor(u.cursor.idx === null || u.cursor.idx === undefined ? null : { t: u.data[0][u.cursor.idx], values: u.data.slice(1).map((c) => c[u.cursor.idx]) })],
+        setCursor: [
+          (u) =>
+            setCursor(
+              u.cursor.idx === null || u.cursor.idx === undefined
+                ? null
+                : { t: u.data[0][u.cursor.idx], values: u.data.slice(1).map((c) => c[u.cursor.idx]) },
+            ),
+        ],
         setSelect: [
           (u) => {
             if (u.select.width < 4) return;
@@ -238,7 +264,9 @@ export default function Trends() {
       const v = scaled(about, column[0]);
       if (before !== null && (trigger.edge === 'rises' ? before < level && v >= level : before > level && v <= level)) {
         fired = at * CYCLE_S;
-        note(`Trigger: ${trigger.name} ${trigger.edge === 'rises' ? 'rose above' : 'fell below'} ${trigger.level} ${about.unit} at ${fired.toFixed(2)} s`);
+        note(
+          `Trigger: ${trigger.name} ${trigger.edge === 'rises' ? 'rose above' : 'fell below'} ${trigger.level} ${about.unit} at ${fired.toFixed(2)} s`,
+        );
       }
       before = v;
     };
@@ -278,17 +306,28 @@ export default function Trends() {
   const same = (list) => list.join() === pens.join();
 
   return html`<div class="head"><h1>Trends</h1>
-      <div class="pick" role="group" aria-label="Window">${WINDOWS.map((s) => html`<button type="button" key=${s} aria-pressed=${s === seconds ? 'true' : 'false'} onClick=${() => setSeconds(s)}>${s < 60 ? `${s} s` : `${s / 60} min`}</button>`)}</div>
-      <button type="button" class=${paused ? 'main' : ''} aria-pressed=${paused ? 'true' : 'false'} onClick=${() => setPaused(!paused)}><${Icon} name=${paused ? 'play' : 'pause'} /> ${paused ? 'Go on' : 'Pause'}</button>
+      <div class="pick" role="group" aria-label="Window">
+        ${WINDOWS.map((s) => html`<button type="button" key=${s} aria-pressed=${s === seconds ? 'true' : 'false'}
+          onClick=${() => setSeconds(s)}>${s < 60 ? `${s} s` : `${s / 60} min`}</button>`)}</div>
+      <button type="button" class=${paused ? 'main' : ''} aria-pressed=${paused ? 'true' : 'false'}
+        onClick=${() => setPaused(!paused)}><${Icon} name=${paused ? 'play' : 'pause'} /> ${paused ? 'Go on' : 'Pause'}
+          </button>
     </div>
     <div class="trends">
       <section class="card plot" aria-label="Curves">
-        <div class="presets" role="group" aria-label="Presets">${PRESETS.map(([name, what, list]) => html`<button type="button" key=${name} class="small" title=${what} aria-pressed=${same(list) ? 'true' : 'false'} onClick=${() => setPens(list)}>${name}</button>`)}</div>
-        <div class="canvas" ref=${box} role="img" aria-label=${`Curves of ${pens.join(', ')}; the values stand in the list of pens`} />
+        <div class="presets" role="group" aria-label="Presets">
+          ${PRESETS.map(([name, what, list]) => html`<button type="button" key=${name} class="small" title=${what}
+            aria-pressed=${same(list) ? 'true' : 'false'} onClick=${() => setPens(list)}>${name}</button>`)}</div>
+        <div class="canvas" ref=${box} role="img"
+          aria-label=${`Curves of ${pens.join(', ')}; the values stand in the list of pens`} />
         <div class="row spread under">
-          <span class="quiet">${zoomed ? 'Zoomed' : paused ? 'Paused' : 'Drag over the curves to zoom'}${cursor ? html`, cursor at <b>${cursor.t.toFixed(2)} s</b>` : ''}</span>
-          <span class="row">${zoomed ? html`<button type="button" class="small" onClick=${() => ((view.current.zoom = null), setZoomed(false))}>Whole window</button>` : null}
-            <button type="button" class="small" onClick=${() => save('trends.csv', new Blob([csv(pens, ...bounds())], { type: 'text/csv' }))}>CSV</button>
+          <span class="quiet">
+            ${zoomed ? 'Zoomed' : paused ? 'Paused' : 'Drag over the curves to zoom'}${cursor ? html`, cursor at <b>
+              ${cursor.t.toFixed(2)} s</b>` : ''}</span>
+          <span class="row">${zoomed ? html`<button type="button" class="small"
+            onClick=${() => ((view.current.zoom = null), setZoomed(false))}>Whole window</button>` : null}
+            <button type="button" class="small"
+              onClick=${() => save('trends.csv', new Blob([csv(pens, ...bounds())], { type: 'text/csv' }))}>CSV</button>
             <button type="button" class="small" onClick=${png}>PNG</button></span>
         </div>
       </section>
@@ -297,20 +336,39 @@ export default function Trends() {
         <ul>${pens.map((name, i) => {
           const about = signals.value.get(name);
           return html`<li key=${name}>
-            <svg viewBox="0 0 26 8" aria-hidden="true"><line x1="1" x2="25" y1="4" y2="4" stroke=${colours[i % colours.length]} stroke-width="3" stroke-dasharray=${DASHES[Math.floor(i / colours.length) % 3].join(' ')} /></svg>
+            <svg viewBox="0 0 26 8" aria-hidden="true">
+              <line x1="1" x2="25" y1="4" y2="4" stroke=${colours[i % colours.length]} stroke-width="3"
+                stroke-dasharray=${DASHES[Math.floor(i / colours.length) % 3].join(' ')} /></svg>
             <span title=${about?.description}><code>${name}</code></span>
             <${Now} name=${name} at=${cursor?.values[i]} />
-            <button type="button" class="plain" aria-label=${`Remove ${name}`} onClick=${() => setPens(pens.filter((p) => p !== name))} disabled=${pens.length === 1}><${Icon} name="close" /></button></li>`;
+            <button type="button" class="plain" aria-label=${`Remove ${name}`}
+              onClick=${() => setPens(pens.filter((p) => p !== name))} disabled=${pens.length === 1}>
+                <${Icon} name="close" /></button></li>`;
         })}</ul>
-        <${Field} label="Add a signal">${(a) => html`<select ...${a} value=${adding} onChange=${(e) => add(e.target.value)}><option value="">choose …</option>${all.filter((s) => !pens.includes(s.name)).map((s) => html`<option key=${s.name} value=${s.name}>${s.name}${s.unit ? ` [${s.unit}]` : ''}</option>`)}</select>`}<//>
+        <${Field} label="Add a signal">
+          ${(a) => html`<select ...${a} value=${adding} onChange=${(e) => add(e.target.value)}>
+            <option value="">choose …</option>
+              ${all.filter((s) => !pens.includes(s.name)).map((s) => html`<option key=${s.name} value=${s.name}>
+                ${s.name}${s.unit ? ` [${s.unit}]` : ''}</option>`)}</select>`}<//>
         <h2>Trigger</h2>
         <div class="trigger">
-          <${Field} label="Signal">${(a) => html`<select ...${a} value=${trigger.name} disabled=${armed === 'armed'} onChange=${(e) => setTrigger({ ...trigger, name: e.target.value })}>${all.map((s) => html`<option key=${s.name}>${s.name}</option>`)}</select>`}<//>
-          <${Field} label="Edge">${(a) => html`<select ...${a} value=${trigger.edge} disabled=${armed === 'armed'} onChange=${(e) => setTrigger({ ...trigger, edge: e.target.value })}><option value="rises">rises above</option><option value="falls">falls below</option></select>`}<//>
-          <${Field} label="Level" unit=${signals.value.get(trigger.name)?.unit}>${(a) => html`<input ...${a} type="number" step="any" value=${trigger.level} disabled=${armed === 'armed'} onInput=${(e) => setTrigger({ ...trigger, level: e.target.value })} />`}<//>
-          <${Field} label="History before" unit="s">${(a) => html`<input ...${a} type="number" min="0" max=${seconds} value=${trigger.before} disabled=${armed === 'armed'} onInput=${(e) => setTrigger({ ...trigger, before: e.target.value })} />`}<//>
+          <${Field} label="Signal">${(a) => html`<select ...${a} value=${trigger.name} disabled=${armed === 'armed'}
+            onChange=${(e) => setTrigger({ ...trigger, name: e.target.value })}>
+              ${all.map((s) => html`<option key=${s.name}>${s.name}</option>`)}</select>`}<//>
+          <${Field} label="Edge">${(a) => html`<select ...${a} value=${trigger.edge} disabled=${armed === 'armed'}
+            onChange=${(e) => setTrigger({ ...trigger, edge: e.target.value })}>
+              <option value="rises">rises above</option><option value="falls">falls below</option></select>`}<//>
+          <${Field} label="Level" unit=${signals.value.get(trigger.name)?.unit}>
+            ${(a) => html`<input ...${a} type="number" step="any" value=${trigger.level} disabled=${armed === 'armed'}
+              onInput=${(e) => setTrigger({ ...trigger, level: e.target.value })} />`}<//>
+          <${Field} label="History before" unit="s">
+            ${(a) => html`<input ...${a} type="number" min="0" max=${seconds} value=${trigger.before}
+              disabled=${armed === 'armed'} onInput=${(e) => setTrigger({ ...trigger, before: e.target.value })} />`}
+                <//>
         </div>
-        <button type="button" class=${armed === 'armed' ? 'main' : ''} onClick=${() => (armed === 'armed' ? setArmed('off') : (setPaused(false), setArmed('armed')))}>${armed === 'armed' ? 'Armed: waiting; disarm' : armed === 'fired' ? 'Fired; arm again' : 'Arm'}</button>
+        <button type="button" class=${armed === 'armed' ? 'main' : ''}
+          onClick=${() => (armed === 'armed' ? setArmed('off') : (setPaused(false), setArmed('armed')))}>
+            ${armed === 'armed' ? 'Armed: waiting; disarm' : armed === 'fired' ? 'Fired; arm again' : 'Arm'}</button>
       </section>
     </div>`;
 }
@@ -320,5 +378,6 @@ function Now({ name, at }) {
   const about = signals.value.get(name);
   if (!about) return null;
   const v = at === undefined ? value(name) : at;
-  return html`<span class="num"><b>${v === null ? '–' : figure(v, digits(about) > 1 ? 2 : digits(about))}</b>${about.unit ? html`<i>${about.unit}</i>` : null}</span>`;
+  return html`<span class="num"><b>${v === null ? '–' : figure(v, digits(about) > 1 ? 2 : digits(about))}</b>
+    ${about.unit ? html`<i>${about.unit}</i>` : null}</span>`;
 }
