@@ -214,8 +214,7 @@ fn installed(names: &[&str], what: &str, by_hand: &str) -> Result<PathBuf> {
         eprintln!("winder: {error:#}; trying to install all the same");
     }
     apt_get(&install)?;
-    present()
-        .with_context(|| format!("apt-get has installed {package}, but it is not on the PATH"))
+    present().with_context(|| format!("apt-get has installed {package}, but it is not on the PATH"))
 }
 
 /// A Rust target of the microcontrollers, installed with rustup where it is missing.

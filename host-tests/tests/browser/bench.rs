@@ -74,8 +74,11 @@ impl Bench {
     /// Shows a page.
     #[track_caller]
     pub fn show(&mut self, page: &str) {
-        self.page.click(&format!("document.querySelector('nav a[href=\"#/{page}\"]')"));
-        self.page.until(&format!("!!document.querySelector('main.page-{page} h1')"));
+        self.page.click(&format!(
+            "document.querySelector('nav a[href=\"#/{page}\"]')"
+        ));
+        self.page
+            .until(&format!("!!document.querySelector('main.page-{page} h1')"));
     }
 
     /// The first password, in the dialog that a first change brings up.
@@ -89,7 +92,8 @@ impl Bench {
 
     /// The password, in the dialog that asks for it.
     pub fn enter_password(&mut self) {
-        self.page.until("document.querySelector('dialog input[name=password]') !== null");
+        self.page
+            .until("document.querySelector('dialog input[name=password]') !== null");
         self.page.fill("Password", PASSWORD);
         self.page.key("Enter");
         self.page.until("!document.querySelector('dialog')");
@@ -120,7 +124,9 @@ impl Bench {
 
     /// What a PLC would read.
     pub fn feedback(&mut self) -> Feedback {
-        self.link.read().unwrap_or_else(|error| panic!("{error:#}\n{}", self.log.last(20)))
+        self.link
+            .read()
+            .unwrap_or_else(|error| panic!("{error:#}\n{}", self.log.last(20)))
     }
 
     /// The value of a signal in its unit, as a PLC would read it.

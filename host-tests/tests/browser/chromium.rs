@@ -44,7 +44,10 @@ impl Chromium {
             .args(["--no-first-run", "--no-default-browser-check"])
             .args(["--disable-gpu", "--hide-scrollbars", "--mute-audio"])
             // it would ask its maker for updates and lists
-            .args(["--disable-background-networking", "--disable-component-update"])
+            .args([
+                "--disable-background-networking",
+                "--disable-component-update",
+            ])
             .args(["--disable-sync", "--disable-extensions"])
             // containers have little shared memory, and root has no sandbox; it shows our own page only
             .args(["--disable-dev-shm-usage", "--no-sandbox"])
@@ -77,7 +80,9 @@ impl Chromium {
 
     /// A new page, at an address.
     pub fn open(&mut self, url: &str) -> Page {
-        let made = self.control.call("Target.createTarget", json!({ "url": "about:blank" }));
+        let made = self
+            .control
+            .call("Target.createTarget", json!({ "url": "about:blank" }));
         let id = made["targetId"].as_str().expect("an id").to_owned();
         let downloads = self.profile.path().join("downloads");
         fs::create_dir_all(&downloads).expect("a directory");
@@ -145,7 +150,10 @@ impl Socket {
     fn call(&mut self, method: &str, params: Value) -> Value {
         let id = self.send(method, params).expect("chromium listens");
         loop {
-            let message = self.stream.read().unwrap_or_else(|error| panic!("{method}: {error}"));
+            let message = self
+                .stream
+                .read()
+                .unwrap_or_else(|error| panic!("{method}: {error}"));
             let Message::Text(text) = message else {
                 continue;
             };
@@ -200,7 +208,10 @@ impl Page {
         while self.eval(expression) != true {
             if began.elapsed() > PATIENCE {
                 let text = self.eval("document.body.innerText");
-                panic!("not so: {expression}\nthe page:\n{}", text.as_str().unwrap_or_default());
+                panic!(
+                    "not so: {expression}\nthe page:\n{}",
+                    text.as_str().unwrap_or_default()
+                );
             }
             thread::sleep(PAUSE);
         }
@@ -209,7 +220,10 @@ impl Page {
     /// Waits until the page shows a text.
     #[track_caller]
     pub fn until_text(&mut self, text: &str) {
-        self.until(&format!("document.body.innerText.includes({})", json!(text)));
+        self.until(&format!(
+            "document.body.innerText.includes({})",
+            json!(text)
+        ));
     }
 
     /// Clicks the first thing that `expression` finds, as a person does: where it can be seen, once it can be used.
@@ -300,7 +314,11 @@ impl Page {
     /// The events of a kind so far.
     pub fn events<'a>(&'a self, method: &'a str) -> impl Iterator<Item = &'a Value> {
         let of = move |event: &&Value| event["method"] == method;
-        self.socket.events.iter().filter(of).map(|event| &event["params"])
+        self.socket
+            .events
+            .iter()
+            .filter(of)
+            .map(|event| &event["params"])
     }
 
     /// What the page complained about: exceptions, errors and warnings in its console, requests that failed.
@@ -333,14 +351,28 @@ impl Page {
     /// Texts that came over streams.
     pub fn frames(&self) -> Vec<String> {
         self.events("Network.webSocketFrameReceived")
-            .map(|e| e["response"]["payloadData"].as_str().unwrap_or_default().to_owned())
+            .map(|e| {
+                e["response"]["payloadData"]
+                    .as_str()
+                    .unwrap_or_default()
+                    .to_owned()
+            })
             .collect()
     }
 
     /// Roles and names of what can be operated, as the browser tells them to a screen reader.
     pub fn controls(&mut self) -> Vec<(String, String)> {
         const OPERATED: [&str; 11] = [
-            "button", "link", "textbox", "searchbox", "combobox", "spinbutton", "checkbox", "switch", "radio", "slider",
+            "button",
+            "link",
+            "textbox",
+            "searchbox",
+            "combobox",
+            "spinbutton",
+            "checkbox",
+            "switch",
+            "radio",
+            "slider",
             "listbox",
         ];
         let tree = self.call("Accessibility.getFullAXTree", json!({}));

@@ -8,10 +8,23 @@ use crate::bench::Bench;
 use crate::chromium::Page;
 
 const PAGES: [&str; 9] = [
-    "machine", "trends", "parameters", "autotune", "drive", "faults", "link", "session", "health",
+    "machine",
+    "trends",
+    "parameters",
+    "autotune",
+    "drive",
+    "faults",
+    "link",
+    "session",
+    "health",
 ];
-/// Phone, tablet, desktop: widths and heights, px.
-const SCREENS: [(u32, u32); 3] = [(390, 844), (820, 1180), (1440, 900)];
+/// Phone, tablet, desktop, and in the dark: width and height, px, and whether it is dark.
+const SCREENS: [(u32, u32, bool); 4] = [
+    (390, 844, false),
+    (820, 1180, false),
+    (1440, 900, false),
+    (1440, 900, true),
+];
 
 /// Text whose contrast is below what WCAG 2.2 asks for (1.4.3, level AA), with its ratio.
 ///
@@ -71,7 +84,9 @@ const OPERATED: &str = "[...document.querySelectorAll('a[href], button, input, s
 fn strings(page: &mut Page, expression: &str) -> Vec<String> {
     let list = page.eval(expression);
     let texts = list.as_array().expect("a list").iter();
-    texts.map(|text| text.as_str().unwrap_or_default().to_owned()).collect()
+    texts
+        .map(|text| text.as_str().unwrap_or_default().to_owned())
+        .collect()
 }
 
 /// With a set being wound, so that there is something to see.
@@ -85,29 +100,28 @@ fn winding() -> Bench {
 #[test]
 fn every_page_is_whole_readable_and_named_at_every_width() {
     let mut bench = winding();
-    for (width, height) in SCREENS {
-        for dark in [false, true] {
-            bench.page.screen(width, height, dark);
-            for name in PAGES {
-                bench.show(name);
-                // curves, tables and what is asked for once a second
-                bench.page.until("!document.querySelector('main .wait')");
-                std::thread::sleep(std::time::Duration::from_millis(400));
-                let at = format!("{name} at {width} px, {}", if dark { "dark" } else { "light" });
+    for (width, height, dark) in SCREENS {
+        let scheme = if dark { "dark" } else { "light" };
+        bench.page.screen(width, height, dark);
+        for name in PAGES {
+            bench.show(name);
+            bench.page.until("!document.querySelector('main .wait')");
+            let at = format!("{name} at {width} px, {scheme}");
 
-                let wide = bench.page.eval("document.documentElement.scrollWidth - innerWidth");
-                assert!(wide.as_f64() <= Some(0.0), "{at} is {wide} px too wide");
-                let faint = strings(&mut bench.page, FAINT);
-                assert!(faint.is_empty(), "{at}, too faint:\n{}", faint.join("\n"));
-                let controls = bench.page.controls();
-                assert!(controls.len() > PAGES.len(), "{at}: {controls:?}");
-                let nameless: Vec<_> = controls.iter().filter(|(_, name)| name.trim().is_empty()).collect();
-                assert!(nameless.is_empty(), "{at}, without a name: {nameless:?}");
+            let wide = bench
+                .page
+                .eval("document.documentElement.scrollWidth - innerWidth");
+            assert!(wide.as_f64() <= Some(0.0), "{at} is {wide} px too wide");
+            let faint = strings(&mut bench.page, FAINT);
+            assert!(faint.is_empty(), "{at}, too faint:\n{}", faint.join("\n"));
+            let controls = bench.page.controls();
+            assert!(controls.len() > PAGES.len(), "{at}: {controls:?}");
+            let nameless = controls.iter().filter(|(_, name)| name.trim().is_empty());
+            let nameless: Vec<_> = nameless.collect();
+            assert!(nameless.is_empty(), "{at}, without a name: {nameless:?}");
 
-                let scheme = if dark { "dark" } else { "light" };
-                let file = setup::scratch(&format!("hmi-{name}-{width}-{scheme}.png"));
-                bench.page.picture(&file.expect("a place"));
-            }
+            let file = setup::scratch(&format!("hmi-{name}-{width}-{scheme}.png"));
+            bench.page.picture(&file.expect("a place"));
         }
     }
     let complaints = bench.page.complaints();
@@ -128,10 +142,14 @@ fn every_control_is_reached_by_keyboard_and_shows_it() {
     for name in PAGES {
         bench.show(name);
         bench.page.until("!document.querySelector('main .wait')");
-        let count = bench.page.eval(&format!("(window.operated = {OPERATED}).length"));
+        let count = bench
+            .page
+            .eval(&format!("(window.operated = {OPERATED}).length"));
         let count = count.as_u64().expect("a number");
         assert!(count > 10, "{name}: {count}");
-        bench.page.eval("document.activeElement.blur(); document.body.focus(); window.reached = new Set(); 0");
+        bench.page.eval(
+            "document.activeElement.blur(); document.body.focus(); window.reached = new Set(); 0",
+        );
         // once around, and the address bar between
         for _ in 0..count + 5 {
             bench.page.key("Tab");
@@ -155,18 +173,28 @@ fn the_first_paint_is_measured() {
     let mut bench = Bench::start();
     let mut paints = Vec::new();
     for _ in 0..5 {
-        bench.page.call("Network.clearBrowserCache", serde_json::json!({}));
+        bench
+            .page
+            .call("Network.clearBrowserCache", serde_json::json!({}));
         let url = format!("http://{}/?{}", bench.http(), paints.len());
         bench.page.go(&url);
-        bench.page.until("performance.getEntriesByName('first-contentful-paint').length === 1");
-        let at = bench.page.eval("performance.getEntriesByName('first-contentful-paint')[0].startTime");
+        bench
+            .page
+            .until("performance.getEntriesByName('first-contentful-paint').length === 1");
+        let at = bench
+            .page
+            .eval("performance.getEntriesByName('first-contentful-paint')[0].startTime");
         paints.push(at.as_f64().expect("a time"));
         bench.page.until_text("NEWS-8000");
     }
     paints.sort_by(f64::total_cmp);
     let text = format!("first contentful paint, ms, of five: {paints:.0?}\n");
     eprint!("{text}");
-    std::fs::write(setup::scratch("hmi-first-paint.txt").expect("a place"), text).expect("a file");
+    std::fs::write(
+        setup::scratch("hmi-first-paint.txt").expect("a place"),
+        text,
+    )
+    .expect("a file");
     // something is drawn before any script has come
     let drawn = bench.page.eval(
         "fetch('/').then((a) => a.text()).then((t) => /<header[^]*Simulated/.test(t) && !/<script(?![^>]*src=)/.test(t))",

@@ -62,32 +62,48 @@ fn exported_is_what_came(csv: &str, frames: &[String]) {
             }
             answer => {
                 if let Some(list) = answer["signals"].as_array() {
-                    names = list.iter().map(|name| name.as_str().expect("a name").to_owned()).collect();
+                    names = list
+                        .iter()
+                        .map(|name| name.as_str().expect("a name").to_owned())
+                        .collect();
                 }
             }
         }
     }
     let mut table = csv::Reader::from_reader(csv.as_bytes());
     let head = table.headers().expect("a head").clone();
-    assert_eq!(head.iter().collect::<Vec<_>>(), ["cycle", "t_s", "d_uw [mm]", "d_wu [mm]"]);
+    assert_eq!(
+        head.iter().collect::<Vec<_>>(),
+        ["cycle", "t_s", "d_uw [mm]", "d_wu [mm]"]
+    );
     let mut rows = 0;
     let mut span = (u64::MAX, 0);
     for row in table.records() {
         let row = row.expect("a row");
         let cycle: u64 = row[0].parse().expect("a cycle");
-        let message = came.get(&cycle).unwrap_or_else(|| panic!("cycle {cycle} never came"));
+        let message = came
+            .get(&cycle)
+            .unwrap_or_else(|| panic!("cycle {cycle} never came"));
         assert_eq!(row[1].parse::<f64>().expect("a time"), cycle as f64 / 100.0);
         for (column, name) in [(2, "d_uw"), (3, "d_wu")] {
             let signal = SIGNALS.iter().find(|s| s.name == name).expect("a signal");
             let counts = row[column].parse::<f64>().expect("a value") * f64::from(signal.counts);
             assert_eq!(counts.round(), message[name], "{name} at {cycle}");
-            assert!((counts - counts.round()).abs() < 1e-6, "{name} at {cycle}: {}", &row[column]);
+            assert!(
+                (counts - counts.round()).abs() < 1e-6,
+                "{name} at {cycle}: {}",
+                &row[column]
+            );
         }
         span = (span.0.min(cycle), span.1.max(cycle));
         rows += 1;
     }
     assert!(rows > 100, "{rows} rows");
-    assert_eq!(rows, came.range(span.0..=span.1).count(), "rows between {span:?}");
+    assert_eq!(
+        rows,
+        came.range(span.0..=span.1).count(),
+        "rows between {span:?}"
+    );
 }
 
 #[test]
@@ -98,8 +114,14 @@ fn a_bad_value_is_refused_beside_its_field_and_a_good_one_is_applied_with_the_ot
     bench.page.fill(CALIPER, "0.1");
     bench.page.key("Enter");
     bench.page.until_text("0.1 m is above the highest, 0.005 m");
-    let described = bench.page.eval(&format!("document.getElementById({}.getAttribute('aria-describedby')).innerText", field(CALIPER)));
-    assert!(described.as_str().unwrap_or_default().contains("0.005"), "{described}");
+    let described = bench.page.eval(&format!(
+        "document.getElementById({}.getAttribute('aria-describedby')).innerText",
+        field(CALIPER)
+    ));
+    assert!(
+        described.as_str().unwrap_or_default().contains("0.005"),
+        "{described}"
+    );
     assert!(parameter(&mut bench, CALIPER, "staged").is_null());
 
     bench.page.fill(CALIPER, "0.00006");
@@ -142,13 +164,18 @@ fn auto_tune_runs_to_its_end_and_finds_the_drums_inertia() {
     bench.take_control();
     bench.show("autotune");
     bench.page.press("Start auto-tune");
-    bench.page.until_text("Drum speed: the new gains are in use.");
+    bench
+        .page
+        .until_text("Drum speed: the new gains are in use.");
     let found = bench.value(&image::AUTOTUNE_INERTIA);
     // all rolls of the windup, referred to the rear drum's shaft
     let machine = Machine::news_8000();
     let radius = machine.rear_drum.radius_m;
     let inertia = machine.windup_mass_kg(machine.shipping_roll.core_radius_m) * radius * radius;
-    assert!((found / inertia - 1.0).abs() < 0.02, "{found} of {inertia} kg·m²");
+    assert!(
+        (found / inertia - 1.0).abs() < 0.02,
+        "{found} of {inertia} kg·m²"
+    );
     let shown = bench.page.eval("[...document.querySelectorAll('tr')].find((r) => r.innerText.startsWith('Inertia')).querySelector('b').textContent.replace(/\\s/g, '')");
     assert_eq!(shown, format!("{found:.1}"));
 }
@@ -160,16 +187,24 @@ fn a_web_break_is_put_in_by_a_click_seen_and_acknowledged() {
     bench.run(ROLL.1, 600);
     bench.show("faults");
     bench.page.press("Web break");
-    bench.until("the drives see it", |feedback| feedback.word(&image::FAULT) == Fault::WebBreak as u16);
+    bench.until("the drives see it", |feedback| {
+        feedback.word(&image::FAULT) == Fault::WebBreak as u16
+    });
     bench.page.until_text("Fault 2");
     assert_eq!(bench.value(&image::BROKEN_SPAN), 1.0);
     bench.show("machine");
-    bench.page.until("getComputedStyle(document.querySelector('.scene .torn')).visibility === 'visible'");
-    bench.page.until("[...document.querySelectorAll('.scene text')].some((t) => t.textContent === 'Web break')");
+    bench
+        .page
+        .until("getComputedStyle(document.querySelector('.scene .torn')).visibility === 'visible'");
+    bench.page.until(
+        "[...document.querySelectorAll('.scene text')].some((t) => t.textContent === 'Web break')",
+    );
     bench.show("faults");
     bench.page.press("All sound");
     bench.page.until_text("The machine is sound.");
-    bench.until("it stands", |feedback| feedback.word(&image::WINDER_STATUS) & status::ZERO_SPEED != 0);
+    bench.until("it stands", |feedback| {
+        feedback.word(&image::WINDER_STATUS) & status::ZERO_SPEED != 0
+    });
     bench.page.press("Acknowledge");
     bench.until("no fault", |feedback| feedback.word(&image::FAULT) == 0);
     bench.page.until("!document.querySelector('.alarm.bad')");
@@ -184,11 +219,17 @@ fn a_snapshot_is_taken_and_restored() {
     bench.page.press("Take a snapshot");
     bench.page.until_text("Taken at");
     let taken = bench.value(&image::LENGTH_WU);
-    bench.until("more paper", |feedback| feedback.get::<f64>(&image::LENGTH_WU) > taken + 100.0);
+    bench.until("more paper", |feedback| {
+        feedback.get::<f64>(&image::LENGTH_WU) > taken + 100.0
+    });
     bench.page.press("Restore");
-    bench.until("less paper", |feedback| feedback.get::<f64>(&image::LENGTH_WU) < taken + 50.0);
+    bench.until("less paper", |feedback| {
+        feedback.get::<f64>(&image::LENGTH_WU) < taken + 50.0
+    });
     // and it goes on from there
-    bench.until("more paper again", |feedback| feedback.get::<f64>(&image::LENGTH_WU) > taken + 60.0);
+    bench.until("more paper again", |feedback| {
+        feedback.get::<f64>(&image::LENGTH_WU) > taken + 60.0
+    });
     assert_eq!(mode(&bench.feedback()), Some(Mode::Run));
 }
 
@@ -198,17 +239,28 @@ fn a_trainee_sees_no_faults_and_leaves_with_the_password_only() {
     bench.take_control();
     bench.page.press("Access");
     bench.page.press("Trainee view");
-    bench.page.until("!document.querySelector('nav a[href=\"#/faults\"]')");
+    bench
+        .page
+        .until("!document.querySelector('nav a[href=\"#/faults\"]')");
     bench.page.eval("location.hash = '#/faults'; 0");
-    bench.page.until("!!document.querySelector('main.page-machine')");
+    bench
+        .page
+        .until("!!document.querySelector('main.page-machine')");
     bench.page.press("Access");
     bench.page.press("Leave the trainee view");
     bench.page.key("Escape");
     bench.page.until("!document.querySelector('dialog input')");
-    assert_eq!(bench.page.eval("document.querySelector('nav a[href=\"#/faults\"]')"), Value::Null);
+    assert_eq!(
+        bench
+            .page
+            .eval("document.querySelector('nav a[href=\"#/faults\"]')"),
+        Value::Null
+    );
     bench.page.press("Leave the trainee view");
     bench.enter_password();
-    bench.page.until("!!document.querySelector('nav a[href=\"#/faults\"]')");
+    bench
+        .page
+        .until("!!document.querySelector('nav a[href=\"#/faults\"]')");
 }
 
 #[test]
@@ -223,5 +275,8 @@ fn a_plc_that_writes_takes_over_and_the_page_says_so() {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     bench.page.until_text("The PLC commands.");
-    assert_eq!(bench.page.eval(&format!("{}.disabled", button("Prepare"))), true);
+    assert_eq!(
+        bench.page.eval(&format!("{}.disabled", button("Prepare"))),
+        true
+    );
 }
