@@ -27,6 +27,8 @@ export function geometry(parameters) {
   const idle = [];
   for (let i = 0; parameters.has(`idle[${i}].radius_m`); i++)
     idle.push({ r: of(`idle[${i}].radius_m`), span: of(`idle[${i}].span_m`) });
+  // until the numbers have come
+  if (!idle.length) idle.push({ r: 0.2, span: 6 }, { r: 0.15, span: 3 });
   return {
     full: of('parent_roll.full_radius_m', 1.5),
     spool: of('parent_roll.spool_radius_m', 0.4),

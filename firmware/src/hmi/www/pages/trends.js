@@ -85,6 +85,12 @@ function options(pens, width, height, hooks) {
   const units = [...new Set(pens.map((name) => signals.value.get(name)?.unit ?? ''))];
   const narrow = width < 560;
   const grid = { stroke: line, width: 1 };
+  // an axis that is one pen's alone has its colour
+  const own = (unit) => {
+    const pen = pens.findIndex((name) => (signals.value.get(name)?.unit ?? '') === unit);
+    const last = pens.findLastIndex((name) => (signals.value.get(name)?.unit ?? '') === unit);
+    return units.length > 1 && pen === last ? colours[pen % colours.length] : null;
+  };
   const time = (u, ticks) =>
     ticks.map((s) =>
       s < 0 ? '' : `${Math.floor(s / 60)}:${(s % 60).toFixed(s % 1 ? 1 : 0).padStart(s % 1 ? 4 : 2, '0')}`,
@@ -104,7 +110,7 @@ function options(pens, width, height, hooks) {
         scale: unit || 'none',
         side: i % 2 ? 1 : 3,
         show: i < (narrow ? 2 : 4),
-        stroke: text,
+        stroke: own(unit) ?? text,
         font,
         grid: i ? { show: false } : grid,
         ticks: grid,
