@@ -19,6 +19,7 @@ pub mod desk;
 mod documents;
 mod guard;
 mod live;
+pub mod panel;
 pub mod routes;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;

@@ -15,6 +15,8 @@ use crate::chromium::{Chromium, Page, button};
 
 /// Several times real time, with room for a browser beside it.
 pub const PACE: f64 = 5.0;
+/// Values are coming.
+pub const LIVE: &str = "document.querySelector('.stream.live') !== null";
 /// Nobody's password but a test's.
 const PASSWORD: &str = "reel and core";
 
@@ -45,7 +47,7 @@ impl Bench {
         let url = format!("http://{}/", simulator.http());
         let mut page = browser.open(&url);
         page.screen(1440, 900, false);
-        page.until_text("NEWS-8000");
+        page.until(LIVE);
         Self {
             page,
             link,

@@ -4,7 +4,7 @@
 
 use host_tests::setup;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, LIVE};
 use crate::chromium::Page;
 
 const PAGES: [&str; 9] = [
@@ -185,7 +185,7 @@ fn the_first_paint_is_measured() {
             .page
             .eval("performance.getEntriesByName('first-contentful-paint')[0].startTime");
         paints.push(at.as_f64().expect("a time"));
-        bench.page.until_text("NEWS-8000");
+        bench.page.until(LIVE);
     }
     paints.sort_by(f64::total_cmp);
     let text = format!("first contentful paint, ms, of five: {paints:.0?}\n");

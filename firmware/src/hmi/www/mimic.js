@@ -362,8 +362,9 @@ class Scene {
       label ? 'on' : '',
     );
     const start = lines[0];
-    const [vx, vy] = small ? [w - 8, 22] : [(start[0][0] + start[1][0]) / 2 + 12, (start[0][1] + start[1][1]) / 2 - 14];
-    const [tx, ty] = small ? [w - 8, 42] : [on.x - on.r - 9, on.y + on.r + t];
+    const clear = rider.x - 2.2 * rider.r - 12;
+    const [vx, vy] = small ? [clear, 22] : [(start[0][0] + start[1][0]) / 2 + 12, (start[0][1] + start[1][1]) / 2 - 14];
+    const [tx, ty] = small ? [clear, 42] : [on.x - on.r - 9, on.y + on.r + t];
     this.text('v', vx, vy, `${figure(now.v, 0)} m/min`, small ? 'end' : 'start', 'big');
     this.text('t', tx, ty, `${figure(now.tension, 0)} N/m`, 'end', `big ${kind}`);
     this.text('sl', kx + kr * 2.1, ky + 4, narrow ? '' : 'Slitter', 'start', 'name');

@@ -8,7 +8,7 @@ import { signals, counts, figure } from '../live.js';
 import { Num, useGet, useLive } from '../parts.js';
 
 /** Upper ends of the poll intervals' classes, ms; the last has none. */
-const CLASSES = ['2', '5', '10', '20', '50', '100', '200', 'more'];
+const CLASSES = ['5', '10', '20', '50', '100', '200', '500', 'more'];
 
 function Histogram({ counts: list }) {
   const most = Math.max(...list, 1);

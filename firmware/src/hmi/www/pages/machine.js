@@ -177,7 +177,7 @@ function More({ mine }) {
 function Panel({ of }) {
   const [panel, , again] = useGet('panel', 500);
   const [goal, setGoal] = useState('diameter');
-  const [entry, setEntry] = useState({ speed: '1200', diameter: '400', length: '1000' });
+  const [typed, setEntry] = useState({});
   const by = info.value?.control?.by;
   const state = panel?.state ?? 'off';
   const [at, next] = STATE[state] ?? [-1, ['stop']];
@@ -193,6 +193,9 @@ function Panel({ of }) {
     ],
     length: [1, 100000, 'm'],
   };
+  // a set that takes a few minutes, on a machine of this size
+  const usual = (key, share) => String(Math.round(limits[key][1] * share));
+  const entry = { speed: usual('speed', 0.48), diameter: usual('diameter', 0.32), length: '1000', ...typed };
   const wrong = (key) => {
     const [low, high, unit] = limits[key];
     const n = Number(entry[key]);
@@ -215,7 +218,7 @@ function Panel({ of }) {
   const input = (key, label) =>
     html`<${Field} label=${label} unit=${limits[key][2]} error=${wrong(key)}>${(a) => html`<input ...${a} type="number"
     inputmode="decimal" min=${limits[key][0]} max=${Math.round(limits[key][1])} step="any" value=${entry[key]}
-      onInput=${(e) => setEntry({ ...entry, [key]: e.target.value })} />`}<//>`;
+      onInput=${(e) => setEntry({ ...typed, [key]: e.target.value })} />`}<//>`;
   const invalid = wrong('speed') || (goal !== 'none' && wrong(goal));
 
   const target = panel?.goal ?? {};
