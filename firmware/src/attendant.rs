@@ -31,20 +31,20 @@ pub enum Done {
 pub trait Attendant {
     /// Before: it may command, as a PLC does.
     fn before(&mut self, cycle: u32, image: &mut Image);
-    /// After.
-    fn after(&mut self, cycle: u32, image: &Image);
+    /// After. What it changes of the commands counts from the next cycle on.
+    fn after(&mut self, cycle: u32, image: &mut Image);
     /// What it wants; asked after each cycle, when nothing is under way.
     fn order(&mut self) -> Option<Order>;
-    /// Something has been done; `cycle` is the first after it.
-    fn done(&mut self, cycle: u32, what: Done);
+    /// Something has been done; `cycle` is the first after it, and the image that before it.
+    fn done(&mut self, cycle: u32, what: Done, image: &Image);
 }
 
 /// Nobody.
 impl Attendant for () {
     fn before(&mut self, _: u32, _: &mut Image) {}
-    fn after(&mut self, _: u32, _: &Image) {}
+    fn after(&mut self, _: u32, _: &mut Image) {}
     fn order(&mut self) -> Option<Order> {
         None
     }
-    fn done(&mut self, _: u32, _: Done) {}
+    fn done(&mut self, _: u32, _: Done, _: &Image) {}
 }

@@ -55,7 +55,7 @@ impl<J: Journal> Lockstep<J> {
             None => return,
             Some(Order::Keep) => {
                 self.kept = Some(self.state(image));
-                attendant.done(self.cycle, Done::Kept);
+                attendant.done(self.cycle, Done::Kept, image);
                 return;
             }
             Some(Order::Restore) => self.kept.clone(),
@@ -63,7 +63,7 @@ impl<J: Journal> Lockstep<J> {
         };
         if let Some(state) = goes_on {
             self.go_on_from(state, image);
-            attendant.done(self.cycle, Done::GoesOn);
+            attendant.done(self.cycle, Done::GoesOn, image);
         }
     }
 

@@ -359,6 +359,15 @@ pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
 
         let snapshot = image.lock(|image| {
             let image = &mut *image.borrow_mut();
+            if let Some(Change::Take {
+                cycle: last,
+                rest: Some((_, then)),
+            }) = &change
+                && is_after(cycle.number, *last)
+            {
+                // Told already, though plant and regulators may have been late: then once more.
+                attendant.done(cycle.number, Done::Kept, then);
+            }
             change = match change.take() {
                 Some(Change::Put {
                     cycle: last,
@@ -366,7 +375,7 @@ pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
                     image: then,
                 }) if is_after(cycle.number, last) => {
                     (*logic, *image) = (other, then);
-                    attendant.done(cycle.number, Done::GoesOn);
+                    attendant.done(cycle.number, Done::GoesOn, image);
                     None
                 }
                 other => other,
@@ -433,7 +442,6 @@ impl<R: Scalar> Exchange<R> {
                         image,
                         odd: is_odd(cycle),
                     });
-                    attendant.done(first, Done::Kept);
                     return None;
                 }
                 // Somebody was late, and the parts are not of one moment: once more.

@@ -108,6 +108,16 @@ impl Detail {
     }
 }
 
+impl Detail {
+    /// A number that cannot be; one that JSON does not have is left out.
+    pub fn number(parameter: &str, value: f64, reason: &'static str) -> Self {
+        match value.is_finite() {
+            true => Self::new(parameter, value, reason),
+            false => Self::new(parameter, "", reason),
+        }
+    }
+}
+
 /// As much of a text as there is room for.
 pub fn cut<const N: usize>(text: &str) -> String<N> {
     let mut out = String::new();

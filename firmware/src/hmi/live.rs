@@ -16,6 +16,7 @@ use serde::Deserialize;
 
 use super::Hmi;
 use super::answer::{Detail, List, Refusal, Text};
+use super::body::is_shallow;
 
 /// Signals in one stream.
 const SIGNALS_MAX: usize = 64;
@@ -152,6 +153,9 @@ impl<M: RawMutex> WebSocketCallback for Live<'_, M> {
                 }
             };
             match message {
+                Message::Text(text) if !is_shallow(text.as_bytes()) => {
+                    return tx.close((UNSUPPORTED, "nested too deep")).await;
+                }
                 Message::Text(text) => {
                     let mut reply = String::<MESSAGE_BYTES>::new();
                     // What does not fit is a list of long names, and those the client knows.

@@ -8,19 +8,27 @@
 //! | Module | |
 //! |---|---|
 //! | [`routes`] | the table of what can be asked, and the one way in |
-//! | `guard` | who may ask |
-//! | `answer` | what goes out, piece by piece |
+//! | `guard`, `auth` | who may ask, who may change something |
+//! | `body`, `answer`, `documents` | what comes in and what goes out, piece by piece |
 //! | `live` | the stream of signals |
-//! | [`desk`] | what there is beside the image |
+//! | [`desk`] | what there is beside the image, and the way to the simulator |
+//! | `setup` | the machine's parameters, staged and applied as one |
+//! | [`panel`] | the operator panel's sequence |
+//! | `events`, `recorder` | what has happened, and every command with its cycle |
 
 mod answer;
 pub mod assets;
+mod auth;
+mod body;
 pub mod desk;
 mod documents;
+mod events;
 mod guard;
 mod live;
 pub mod panel;
+mod recorder;
 pub mod routes;
+mod setup;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use picoserve::io::Socket;

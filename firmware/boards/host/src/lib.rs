@@ -41,6 +41,7 @@ pub const CLIENTS: usize = 8;
 const BOARD: desk::Board = desk::Board {
     name: "a process on a PC",
     version: env!("CARGO_PKG_VERSION"),
+    reset: "started",
 };
 
 /// Before the next try, when a connection cannot be accepted for want of a file descriptor.
@@ -145,7 +146,7 @@ impl Board {
         };
         let (address, listener) = listen(options.port)?;
         let (http, http_listener) = listen(options.http_port)?;
-        let desk = Arc::new(Desk::new(BOARD));
+        let desk = Arc::new(Desk::new(BOARD, &Machine::news_8000()));
         let image = Arc::new(ImageCell::new(RefCell::new(options.image)));
         let control = Control::new(options.access);
         let control = Arc::new(ControlCell::new(RefCell::new(control)));

@@ -50,6 +50,7 @@ type Exchange = tasks::Exchange<Scalar>;
 const BOARD: Board = Board {
     name: "Cortex-M in QEMU (mps2)",
     version: env!("CARGO_PKG_VERSION"),
+    reset: "power-up",
 };
 
 /// What the tasks share, made once.
@@ -90,7 +91,7 @@ pub async fn background(exchange: &'static Exchange) {
     })));
     let control = &*CONTROL.init(ControlCell::new(RefCell::new(Control::default())));
     let service = LocalService { image, control };
-    let desk = &*DESK.init(LocalDesk::new(BOARD));
+    let desk = &*DESK.init(LocalDesk::new(BOARD, &machine()));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(exchange, service, desk).expect("first"));
