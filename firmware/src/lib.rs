@@ -1,4 +1,4 @@
-//! The simulator as firmware, without a board: its tasks, its links, its wires, its journal.
+//! The simulator as firmware, without a board: its tasks, its links, its own HMI, its wires, its journal.
 //!
 //! Not here: clocks, pins, network devices, executors; a board package has them and calls this library.
 #![no_std]
@@ -7,11 +7,14 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod attendant;
+pub mod hmi;
 pub mod journal;
 pub mod link;
 pub mod lockstep;
 pub mod mailbox;
 pub mod net;
+pub mod state;
 pub mod store;
 pub mod tasks;
 pub mod wired;

@@ -10,9 +10,11 @@
 
 use core::future::poll_fn;
 use core::marker::PhantomData;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::mem;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use core::task::Poll;
 
+use atomic_refcell::AtomicRefCell;
 use atomic_waker::AtomicWaker;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::{Duration, Instant, Timer};
@@ -21,12 +23,15 @@ use model_core::exchange::{Actuators, DriveCommand, DriveStatus, Measurements};
 use model_core::image::{self, Feedback, Image};
 use model_core::logic::{Logic, command};
 use model_core::plant::PLANT_PERIOD_MS;
-use model_core::real::{Real, Scalar};
+use model_core::real::Scalar;
 use model_core::simulator::{Plant, Record, logic_tick};
 
+use crate::SPANS;
+use crate::attendant::{Attendant, Done, Order};
 use crate::journal::{Journal, Observer};
 use crate::link::ImageCell;
 use crate::mailbox::Mailbox;
+use crate::state::State;
 use crate::wired::{Inputs, Outputs};
 
 /// What a board measures times with: cycles of the core, or a timer as fast as there is.
@@ -36,6 +41,78 @@ pub trait Stopwatch {
 
     /// Its count, which wraps.
     fn count() -> u32;
+}
+
+/// Where a task's part of the state changes hands, at the beginning of one of its activations.
+///
+/// Whoever gives and takes is below the task and does it in another of its activations, so that neither meets the other
+/// half-way.
+struct Hatch<T> {
+    /// The task has something to do here.
+    open: AtomicBool,
+    handing: AtomicRefCell<Handing<T>>,
+}
+
+/// What is to be done in which activation, or has been done.
+enum Handing<T> {
+    Nothing,
+    Take { at: u32 },
+    Taken { at: u32, part: T },
+    Put { at: u32, part: T },
+}
+
+impl<T> Default for Hatch<T> {
+    fn default() -> Self {
+        Self {
+            open: AtomicBool::new(false),
+            handing: AtomicRefCell::new(Handing::Nothing),
+        }
+    }
+}
+
+impl<T> Hatch<T> {
+    fn set(&self, handing: Handing<T>) {
+        if let Ok(mut place) = self.handing.try_borrow_mut() {
+            *place = handing;
+            self.open.store(true, Ordering::Release);
+        }
+    }
+
+    /// The task comes by, in this activation: leaves its part, or gets another.
+    fn pass(&self, activation: u32, own: impl FnOnce() -> T) -> Option<T> {
+        if !self.open.load(Ordering::Acquire) {
+            return None;
+        }
+        let mut place = self.handing.try_borrow_mut().ok()?;
+        let due = |at: u32| activation.wrapping_sub(at).cast_signed() >= 0;
+        match *place {
+            Handing::Take { at } if due(at) => {
+                self.open.store(false, Ordering::Relaxed);
+                *place = Handing::Taken {
+                    at: activation,
+                    part: own(),
+                };
+                None
+            }
+            Handing::Put { at, .. } if due(at) => {
+                self.open.store(false, Ordering::Relaxed);
+                match mem::replace(&mut *place, Handing::Nothing) {
+                    Handing::Put { part, .. } => Some(part),
+                    _ => None,
+                }
+            }
+            _ => None,
+        }
+    }
+
+    /// What the task has left, in exactly this activation.
+    fn taken(&self, at: u32) -> Option<T> {
+        let mut place = self.handing.try_borrow_mut().ok()?;
+        match mem::replace(&mut *place, Handing::Nothing) {
+            Handing::Taken { at: then, part } if then == at => Some(part),
+            _ => None,
+        }
+    }
 }
 
 /// All that a drive cycle gives the logic.
@@ -50,11 +127,13 @@ struct Cycle<R> {
 }
 
 /// What the tasks hand to each other.
-pub struct Exchange<R> {
-    actuators: Mailbox<Actuators<R>>,
-    measurements: Mailbox<(Measurements<R>, Record)>,
-    command: Mailbox<DriveCommand<R>>,
-    cycle: Mailbox<Cycle<R>>,
+pub struct Exchange<R: Scalar> {
+    actuators: Mailbox<Actuators<R::Si>>,
+    measurements: Mailbox<(Measurements<R::Si>, Record)>,
+    command: Mailbox<DriveCommand<R::Si>>,
+    cycle: Mailbox<Cycle<R::Si>>,
+    plant_hatch: Hatch<(Plant<R, SPANS>, Actuators<R::Si>)>,
+    drive_hatch: Hatch<(Drive<R::Si>, DriveCommand<R::Si>)>,
     /// Drive cycles so far; wraps.
     cycles: AtomicU32,
     next_cycle: AtomicWaker,
@@ -65,7 +144,7 @@ pub struct Exchange<R> {
     logic_times: Times,
 }
 
-impl<R: Real> Default for Exchange<R> {
+impl<R: Scalar> Default for Exchange<R> {
     fn default() -> Self {
         Self {
             actuators: Mailbox::new(Actuators::default()),
@@ -78,6 +157,8 @@ impl<R: Real> Default for Exchange<R> {
                 status: DriveStatus::default(),
                 record: Record::default(),
             }),
+            plant_hatch: Hatch::default(),
+            drive_hatch: Hatch::default(),
             cycles: AtomicU32::new(0),
             next_cycle: AtomicWaker::new(),
             inputs: Mailbox::new(Inputs::default()),
@@ -173,14 +254,21 @@ impl<'a, W: Stopwatch> Rate<'a, W> {
 }
 
 /// The plant's task: the winder moves by 4 ms.
-pub async fn plant<W: Stopwatch, R: Scalar, const SPANS: usize>(
+pub async fn plant<W: Stopwatch, R: Scalar>(
     start: Instant,
     plant: &mut Plant<R, SPANS>,
-    exchange: &Exchange<R::Si>,
+    exchange: &Exchange<R>,
 ) -> ! {
     let mut rate = Rate::<W>::new(start, PLANT_PERIOD_MS, &exchange.plant_times);
+    let mut number = 0_u32;
     loop {
         rate.release().await;
+        let own = || (plant.clone(), exchange.actuators.get());
+        if let Some((other, actuators)) = exchange.plant_hatch.pass(number, own) {
+            *plant = other;
+            exchange.actuators.set(actuators);
+        }
+        number = number.wrapping_add(1);
         let seen = exchange.actuators.look(|actuators| plant.tick(actuators));
         exchange.measurements.set(seen);
         rate.done();
@@ -188,15 +276,20 @@ pub async fn plant<W: Stopwatch, R: Scalar, const SPANS: usize>(
 }
 
 /// The regulators' task: torques from what can be measured.
-pub async fn drive<W: Stopwatch, R: Real>(
+pub async fn drive<W: Stopwatch, R: Scalar>(
     start: Instant,
-    drive: &mut Drive<R>,
+    drive: &mut Drive<R::Si>,
     exchange: &Exchange<R>,
 ) -> ! {
     let mut rate = Rate::<W>::new(start, DRIVE_PERIOD_MS, &exchange.drive_times);
     let mut number = 0_u32;
     loop {
         rate.release().await;
+        let own = || (drive.clone(), exchange.command.get());
+        if let Some((other, command)) = exchange.drive_hatch.pass(number, own) {
+            *drive = other;
+            exchange.command.set(command);
+        }
         let (measurements, record) = exchange.measurements.get();
         let command = &exchange.command;
         let (actuators, status) = command.look(|command| drive.step(command, &measurements));
@@ -215,17 +308,47 @@ pub async fn drive<W: Stopwatch, R: Real>(
     }
 }
 
+/// Drive cycles from an order to its boundary: one of them may be half over, and the logic is the last in it.
+const AHEAD: u32 = 2;
+
+/// The activation of the plant that is the first after a drive cycle. At a common tick the plant comes before the
+/// regulators, and both start counting together.
+const fn plant_after(cycle: u32) -> u32 {
+    let ms = (cycle as u64 + 1) * DRIVE_PERIOD_MS as u64;
+    (ms / PLANT_PERIOD_MS as u64) as u32
+}
+
+/// The drive cycle is the first of two, of which the second has a common tick.
+const fn is_odd(cycle: u32) -> bool {
+    cycle.is_multiple_of(2)
+}
+
+/// A change of hands that is under way: `cycle` is the last before the boundary.
+enum Change<R: Scalar> {
+    Take {
+        cycle: u32,
+        rest: Option<(Logic<R::Si>, Image)>,
+    },
+    Put {
+        cycle: u32,
+        logic: Logic<R::Si>,
+        image: Image,
+    },
+}
+
 /// The logic's task: modes, interlocks and the process image, once a drive cycle.
-pub async fn logic<W: Stopwatch, R: Real, M: RawMutex>(
-    logic: &mut Logic<R>,
+pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
+    logic: &mut Logic<R::Si>,
     exchange: &Exchange<R>,
     image: &ImageCell<M>,
     journal: &mut impl Journal,
+    attendant: &mut impl Attendant,
 ) -> ! {
     let mut observer = Observer::new(image.lock(|image| image.borrow().commands));
     let times = &exchange.logic_times;
     let mut next = 0;
     let mut reset = Edge::default();
+    let (mut change, mut kept) = (None, None);
     loop {
         exchange.cycle_from(next).await;
         let began = W::count();
@@ -236,6 +359,28 @@ pub async fn logic<W: Stopwatch, R: Real, M: RawMutex>(
 
         let snapshot = image.lock(|image| {
             let image = &mut *image.borrow_mut();
+            if let Some(Change::Take {
+                cycle: last,
+                rest: Some((_, then)),
+            }) = &change
+                && is_after(cycle.number, *last)
+            {
+                // Told already, though plant and regulators may have been late: then once more.
+                attendant.done(cycle.number, Done::Kept, then);
+            }
+            change = match change.take() {
+                Some(Change::Put {
+                    cycle: last,
+                    logic: other,
+                    image: then,
+                }) if is_after(cycle.number, last) => {
+                    (*logic, *image) = (other, then);
+                    attendant.done(cycle.number, Done::GoesOn, image);
+                    None
+                }
+                other => other,
+            };
+            attendant.before(cycle.number, image);
             let commands = exchange.inputs.get().act_on(&image.commands);
             let command = logic_tick(
                 logic,
@@ -248,9 +393,16 @@ pub async fn logic<W: Stopwatch, R: Real, M: RawMutex>(
             exchange.command.set(command);
             exchange.report_times::<W>(&mut image.feedback);
             exchange.outputs.set(Outputs::of(&image.feedback));
+            attendant.after(cycle.number, image);
+            if let Some(Change::Take { cycle: last, rest }) = &mut change
+                && *last == cycle.number
+            {
+                *rest = Some((logic.clone(), *image));
+            }
             Image { commands, ..*image }
         });
         observer.look(cycle.number, &snapshot, journal);
+        change = exchange.change(change, &mut kept, cycle.number, attendant);
         times.activation(W::count().wrapping_sub(began), late);
         let word = snapshot.commands.word(&image::WINDER_COMMAND);
         if reset.rises(word & command::RESET_TIMES != 0) {
@@ -259,9 +411,87 @@ pub async fn logic<W: Stopwatch, R: Real, M: RawMutex>(
     }
 }
 
-impl<R: Real> Exchange<R> {
+/// One cycle comes after another, as they wrap.
+const fn is_after(cycle: u32, other: u32) -> bool {
+    cycle.wrapping_sub(other).cast_signed() > 0
+}
+
+impl<R: Scalar> Exchange<R> {
+    /// Moves a change of hands on after a drive cycle, or begins one.
+    fn change(
+        &self,
+        change: Option<Change<R>>,
+        kept: &mut Option<State<R>>,
+        now: u32,
+        attendant: &mut impl Attendant,
+    ) -> Option<Change<R>> {
+        match change {
+            Some(Change::Take { cycle, rest }) if is_after(now, cycle) => {
+                let first = cycle.wrapping_add(1);
+                let plant = self.plant_hatch.taken(plant_after(cycle));
+                let drive = self.drive_hatch.taken(first);
+                if let (Some((plant, actuators)), Some((drive, command)), Some((logic, image))) =
+                    (plant, drive, rest)
+                {
+                    *kept = Some(State {
+                        plant,
+                        drive,
+                        logic,
+                        actuators,
+                        command,
+                        image,
+                        odd: is_odd(cycle),
+                    });
+                    return None;
+                }
+                // Somebody was late, and the parts are not of one moment: once more.
+                Some(self.take(now))
+            }
+            Some(under_way) => Some(under_way),
+            None => match attendant.order()? {
+                Order::Keep => Some(self.take(now)),
+                Order::Restore => kept.clone().map(|state| self.put(now, state)),
+                Order::Rebuild(machine) => {
+                    let state = State::fresh(&machine).ok()?;
+                    Some(self.put(now, state))
+                }
+            },
+        }
+    }
+
+    fn take(&self, now: u32) -> Change<R> {
+        let cycle = now.wrapping_add(AHEAD);
+        let at = plant_after(cycle);
+        self.plant_hatch.set(Handing::Take { at });
+        let at = cycle.wrapping_add(1);
+        self.drive_hatch.set(Handing::Take { at });
+        Change::Take { cycle, rest: None }
+    }
+
+    /// Where plant and regulators next stand to each other as they did in the state.
+    fn put(&self, now: u32, state: State<R>) -> Change<R> {
+        let ahead = now.wrapping_add(AHEAD);
+        let cycle = match is_odd(ahead) == state.odd {
+            true => ahead,
+            false => ahead.wrapping_add(1),
+        };
+        self.plant_hatch.set(Handing::Put {
+            at: plant_after(cycle),
+            part: (state.plant, state.actuators),
+        });
+        self.drive_hatch.set(Handing::Put {
+            at: cycle.wrapping_add(1),
+            part: (state.drive, state.command),
+        });
+        Change::Put {
+            cycle,
+            logic: state.logic,
+            image: state.image,
+        }
+    }
+
     /// What can be measured since the plant's last activation.
-    pub fn measurements(&self) -> Measurements<R> {
+    pub fn measurements(&self) -> Measurements<R::Si> {
         self.measurements.get().0
     }
 

@@ -32,6 +32,7 @@ const LAST_WORDS: usize = 5;
 pub struct Qemu {
     child: Child,
     address: SocketAddr,
+    http: SocketAddr,
     log: Log,
     readers: Vec<JoinHandle<()>>,
 }
@@ -39,14 +40,15 @@ pub struct Qemu {
 impl Qemu {
     /// Starts the simulator and waits until it answers.
     pub fn start(files: &Mps2, options: Options) -> Result<Self> {
-        let port = free_port(options.port)?;
+        let port = free_port(options.port, "--port")?;
+        let http_port = free_port(options.http_port, "--http-port")?;
         let elf = fs::read(&files.firmware)
             .with_context(|| format!("cannot read the firmware {}", files.firmware.display()))?;
         let table = Table::parse(&elf)
             .context("cannot read the log's texts in the firmware")?
             .context("the firmware has no log: its ELF file lacks the defmt section")?;
 
-        let command = command(files, port, options.pace);
+        let command = command(files, port, http_port, options.pace);
         let (started, child) = mpsc::channel();
         let log = options.log.clone();
         let keeper = thread::spawn(move || keep(command, &started, &table, &log));
@@ -59,6 +61,7 @@ impl Qemu {
         let mut qemu = Self {
             child,
             address: SocketAddr::from((Ipv4Addr::LOCALHOST, port)),
+            http: SocketAddr::from((Ipv4Addr::LOCALHOST, http_port)),
             log: options.log,
             readers,
         };
@@ -69,6 +72,11 @@ impl Qemu {
     /// Where it answers Modbus TCP.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Where its HMI is.
+    pub fn http(&self) -> SocketAddr {
+        self.http
     }
 
     /// An error that says why, once QEMU has ended by itself.
@@ -119,14 +127,14 @@ impl Drop for Qemu {
 }
 
 /// A port that nobody listens at: the wanted one, or any for 0.
-fn free_port(wanted: u16) -> Result<u16> {
+fn free_port(wanted: u16, option: &str) -> Result<u16> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, wanted)).with_context(|| {
-        format!("port {wanted} of 127.0.0.1 is not free: choose another with --port")
+        format!("port {wanted} of 127.0.0.1 is not free: choose another with {option}")
     })?;
     Ok(listener.local_addr()?.port())
 }
 
-fn command(files: &Mps2, port: u16, pace: f64) -> Command {
+fn command(files: &Mps2, port: u16, http_port: u16, pace: f64) -> Command {
     // where setpriv is at hand QEMU ends with us however we end, even by SIGKILL
     let mut command = match on_path("setpriv") {
         Some(setpriv) => {
@@ -150,7 +158,7 @@ fn command(files: &Mps2, port: u16, pace: f64) -> Command {
         ])
         .arg("-nic")
         .arg(format!(
-            "user,restrict=on,hostfwd=tcp:127.0.0.1:{port}-:502"
+            "user,restrict=on,hostfwd=tcp:127.0.0.1:{port}-:502,hostfwd=tcp:127.0.0.1:{http_port}-:80"
         ))
         .arg("-kernel")
         .arg(&files.firmware)

@@ -16,6 +16,13 @@ use crate::interrupt;
 
 /// The emulator.
 pub const QEMU: &str = "qemu-system-arm";
+/// Names that the same browser goes by; the first is its Debian package.
+const BROWSERS: [&str; 4] = [
+    "chromium",
+    "chromium-browser",
+    "google-chrome-stable",
+    "google-chrome",
+];
 /// The microcontroller's target: a core with a floating-point unit.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// The target of a core without.
@@ -161,14 +168,30 @@ pub fn scratch(name: &str) -> Result<PathBuf> {
 
 /// The emulator, installed with apt where it is missing.
 pub fn qemu() -> Result<PathBuf> {
-    if let Some(path) = on_path(QEMU) {
+    installed(
+        &[QEMU],
+        "QEMU",
+        "QEMU's system emulator for Arm (7.0 or later)",
+    )
+}
+
+/// A browser for the tests of the simulator's page, installed with apt where there is none.
+pub fn chromium() -> Result<PathBuf> {
+    installed(&BROWSERS, "Chromium", "Chromium (120 or later)")
+}
+
+/// A program by any of its names; where there is none, the Debian package of the first name is installed.
+fn installed(names: &[&str], what: &str, by_hand: &str) -> Result<PathBuf> {
+    let present = || names.iter().find_map(|name| on_path(name));
+    if let Some(path) = present() {
         return Ok(path);
     }
-    const INSTALL: [&str; 4] = ["install", "-y", "--no-install-recommends", QEMU];
+    let package = names[0];
+    let install = ["install", "-y", "--no-install-recommends", package];
     ensure!(
         on_path("apt-get").is_some(),
-        "{QEMU} is not installed, and there is no apt-get to install it with: install QEMU's system emulator for \
-         Arm (7.0 or later) with this system's package manager, then run this again"
+        "{package} is not installed, and there is no apt-get to install it with: install {by_hand} with this system's \
+         package manager, then run this again"
     );
     let prefix: &[&str] = if is_root() {
         &[]
@@ -176,12 +199,12 @@ pub fn qemu() -> Result<PathBuf> {
         &["sudo", "-n"]
     } else {
         bail!(
-            "{QEMU} is not installed, and this user may not install it: run `sudo apt-get update && sudo apt-get {}`, \
-             then run this again",
-            INSTALL.join(" ")
+            "{package} is not installed, and this user may not install it: run `sudo apt-get update && sudo apt-get \
+             {}`, then run this again",
+            install.join(" ")
         );
     };
-    step("installing QEMU (apt-get)");
+    step(&format!("installing {what} (apt-get)"));
     let apt_get = |arguments: &[&str]| {
         let line = [
             prefix,
@@ -197,9 +220,8 @@ pub fn qemu() -> Result<PathBuf> {
     if let Err(error) = apt_get(&["update"]) {
         eprintln!("winder: {error:#}; trying to install all the same");
     }
-    apt_get(&INSTALL)?;
-    on_path(QEMU)
-        .with_context(|| format!("apt-get has installed {QEMU}, but it is not on the PATH"))
+    apt_get(&install)?;
+    present().with_context(|| format!("apt-get has installed {package}, but it is not on the PATH"))
 }
 
 /// A Rust target of the microcontrollers, installed with rustup where it is missing.

@@ -41,6 +41,8 @@ const PACES: RangeInclusive<f64> = 0.01..=1000.0;
 pub struct Options {
     /// Port of 127.0.0.1 for Modbus TCP; 0 takes any free one.
     pub port: u16,
+    /// Port of 127.0.0.1 for the HMI; 0 takes any free one.
+    pub http_port: u16,
     /// Simulated time over real time.
     pub pace: f64,
     /// Where its log goes.
@@ -51,6 +53,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             port: 0,
+            http_port: 0,
             pace: 1.0,
             log: Log::default(),
         }
@@ -97,6 +100,14 @@ impl Simulator {
         }
     }
 
+    /// Where its HMI is.
+    pub fn http(&self) -> SocketAddr {
+        match self {
+            Self::Mps2(qemu) => qemu.http(),
+            Self::Host(board) => board.http,
+        }
+    }
+
     /// An error that says why, once it has ended by itself.
     pub fn check(&mut self) -> Result<()> {
         match self {
@@ -107,14 +118,21 @@ impl Simulator {
 }
 
 fn host(options: Options) -> Result<board_host::Board> {
-    let Options { port, pace, log } = options;
+    let Options {
+        port,
+        http_port,
+        pace,
+        log,
+    } = options;
     let options = board_host::Options {
         port,
+        http_port,
         pace,
         ..board_host::Options::default()
     };
-    board_host::Board::start(options, board_host::simulator(HostJournal(log)))
-        .with_context(|| format!("cannot start the simulator at port {port} of 127.0.0.1"))
+    board_host::Board::simulate(options, HostJournal(log)).with_context(|| {
+        format!("cannot start the simulator at the ports {port} and {http_port} of 127.0.0.1")
+    })
 }
 
 /// The native board's journal, in the words of the firmware's log.

@@ -179,6 +179,30 @@ impl<R: Scalar, const SPANS: usize> Simulator<R, SPANS> {
         );
     }
 
+    /// The simulator between two drive cycles, as its parts were left by other hands: what acts on the winder, what
+    /// the regulators are to do next, and the time within the common period of both tasks, ms.
+    pub fn resume(
+        plant: Plant<R, SPANS>,
+        drive: Drive<R::Si>,
+        logic: Logic<R::Si>,
+        actuators: Actuators<R::Si>,
+        command: DriveCommand<R::Si>,
+        phase_ms: u32,
+    ) -> Self {
+        Self {
+            // Every drive cycle begins with ticks of the plant, which renew these.
+            measurements: Measurements::default(),
+            status: DriveStatus::default(),
+            record: plant.record,
+            plant,
+            drive,
+            logic,
+            actuators,
+            command,
+            phase_ms: phase_ms % (PLANT_PERIOD_MS * DRIVE_PERIOD_MS),
+        }
+    }
+
     /// How far the plant has come.
     pub fn record(&self) -> Record {
         self.record
@@ -187,6 +211,16 @@ impl<R: Scalar, const SPANS: usize> Simulator<R, SPANS> {
     /// What acts on the winder until the next drive cycle.
     pub fn actuators(&self) -> &Actuators<R::Si> {
         &self.actuators
+    }
+
+    /// What the regulators are to do next.
+    pub fn command(&self) -> &DriveCommand<R::Si> {
+        &self.command
+    }
+
+    /// The time within the common period of both tasks, ms.
+    pub fn phase_ms(&self) -> u32 {
+        self.phase_ms
     }
 
     /// What the regulators told last.

@@ -28,7 +28,7 @@ enum Command {
     Demo(demo::Args),
     /// Run the simulator alone, for your PLC
     ///
-    /// Prints `ready modbus=ADDRESS:PORT` on a line of its own once it answers; ends with Ctrl-C.
+    /// Prints `ready modbus=ADDRESS:PORT http=http://ADDRESS:PORT` on a line of its own once it answers; ends with Ctrl-C.
     Run(run::Args),
     /// Install what is missing and run every test, on the host and in QEMU
     Test,

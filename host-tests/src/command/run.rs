@@ -1,7 +1,7 @@
 //! `winder run`
 
 use std::io::{self, Write};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode, Stdio};
 use std::thread;
 use std::time::Duration;
 
@@ -20,6 +20,12 @@ pub struct Args {
     /// Port of 127.0.0.1 for Modbus TCP; 0 takes any free one
     #[arg(long, default_value_t = 0)]
     port: u16,
+    /// Port of 127.0.0.1 for the HMI; 0 takes any free one
+    #[arg(long, default_value_t = 0)]
+    http_port: u16,
+    /// Show the HMI in a browser
+    #[arg(long)]
+    open: bool,
     /// Simulated time over real time
     #[arg(long, default_value_t = 1.0)]
     pace: f64,
@@ -36,6 +42,7 @@ pub fn main(args: Args) -> Result<ExitCode> {
 fn serve(args: Args) -> Result<()> {
     let options = Options {
         port: args.port,
+        http_port: args.http_port,
         pace: args.pace,
         log: Log::new(|line| {
             if line.level >= Level::Info {
@@ -45,11 +52,28 @@ fn serve(args: Args) -> Result<()> {
     };
     let mut simulator = Simulator::start(args.board, options)?;
     let mut out = io::stdout().lock();
-    writeln!(out, "ready modbus={}", simulator.address())?;
+    let page = format!("http://{}", simulator.http());
+    writeln!(out, "ready modbus={} http={page}", simulator.address())?;
     out.flush()?;
+    if args.open {
+        open(&page);
+    }
     loop {
         interrupt::check()?;
         simulator.check()?;
         thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// Asks the desktop for a browser. Without a desktop, the address is on the screen all the same.
+fn open(page: &str) {
+    let opened = Command::new("xdg-open")
+        .arg(page)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+    if let Err(error) = opened {
+        eprintln!("winder: cannot open a browser (xdg-open: {error}); open {page} yourself");
     }
 }

@@ -30,7 +30,9 @@ impl Running {
         let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
         let mut line = String::new();
         out.read_line(&mut line).expect("text");
-        let address = line.trim_end().strip_prefix("ready modbus=");
+        let ready = line.trim_end().strip_prefix("ready modbus=");
+        let address = ready.and_then(|ready| ready.split_once(' '));
+        let address = address.map(|(address, _)| address);
         let address = address.and_then(|address| address.parse().ok());
         Self {
             address: address.unwrap_or_else(|| panic!("not ready: {line:?}")),

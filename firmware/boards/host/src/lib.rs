@@ -1,7 +1,9 @@
 //! The board that is a Linux process: the firmware's links on loopback, and a thread for its timed task.
 //!
-//! Not here: priorities, since the simulator runs in lockstep, see [`simulator`]; hard real time, since a thread of an
+//! Not here: priorities, since the simulator runs in lockstep, see [`Board::simulate`]; hard real time, since a thread of an
 //! ordinary process is late now and then, though no step is ever lost; addresses other than loopback.
+
+mod http;
 
 use std::cell::RefCell;
 use std::io;
@@ -13,6 +15,8 @@ use std::time::{Duration, Instant};
 
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embedded_io_adapters::tokio_1::FromTokio;
+use firmware::attendant::Attendant;
+use firmware::hmi::desk::{self, AtDesk};
 use firmware::journal::Journal;
 use firmware::link::control::{Access, Control, Peer, Protocol};
 use firmware::link::modbus::tcp::{End, Timeouts, session};
@@ -23,12 +27,22 @@ use model_core::image::{Commands, Feedback, Image};
 use model_core::machine::Machine;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
+use tokio::task::LocalSet;
+
+pub use http::{CONNECTIONS, Desk};
 
 /// Period of [`Board::start`]'s `step`: the drive cycle.
 pub const STEP: Duration = Duration::from_millis(10);
 
 /// Modbus clients at once.
 pub const CLIENTS: usize = 8;
+
+/// What this board tells about itself.
+const BOARD: desk::Board = desk::Board {
+    name: "a process on a PC",
+    version: env!("CARGO_PKG_VERSION"),
+    reset: "started",
+};
 
 /// Before the next try, when a connection cannot be accepted for want of a file descriptor.
 const ACCEPT_AGAIN: Duration = Duration::from_millis(10);
@@ -44,6 +58,8 @@ pub type ControlCell = link::ControlCell<CriticalSectionRawMutex>;
 pub struct Options {
     /// Modbus port on loopback; 0 for any that is free.
     pub port: u16,
+    /// The HMI's port on loopback; 0 for any that is free.
+    pub http_port: u16,
     /// How long a client may keep a place without using it.
     pub timeouts: Timeouts,
     /// Which client may do what.
@@ -58,6 +74,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             port: 0,
+            http_port: 0,
             timeouts: Timeouts::default(),
             access: Access::default(),
             image: Image {
@@ -73,6 +90,8 @@ impl Default for Options {
 pub struct Board {
     /// Where Modbus TCP is served.
     pub address: SocketAddr,
+    /// Where the HMI is served.
+    pub http: SocketAddr,
     /// What the clients see.
     pub image: Arc<ImageCell>,
     /// Who controls the winder, and who is connected.
@@ -94,11 +113,40 @@ impl Board {
     /// The port is taken, or the process may have no more sockets or threads.
     pub fn start(
         options: Options,
-        step: impl FnMut(&mut Image) + Send + 'static,
+        mut step: impl FnMut(&mut Image) + Send + 'static,
     ) -> io::Result<Self> {
-        let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, options.port))?;
-        listener.set_nonblocking(true)?;
-        let address = listener.local_addr()?;
+        let mut cycle = 0_u32;
+        Self::run(options, move |image, mut at_desk| {
+            at_desk.before(cycle, image);
+            step(image);
+            at_desk.after(cycle, image);
+            cycle = cycle.wrapping_add(1);
+        })
+    }
+
+    /// Starts serving, and simulates the machine of [`Options::default`] from power-up on, with a journal.
+    ///
+    /// # Errors
+    /// As of [`Board::start`].
+    pub fn simulate(options: Options, journal: impl Journal + Send + 'static) -> io::Result<Self> {
+        let mut lockstep = power_up(journal);
+        Self::run(options, move |image, mut at_desk| {
+            lockstep.attended_cycle(image, &mut at_desk);
+        })
+    }
+
+    fn run(
+        options: Options,
+        mut step: impl FnMut(&mut Image, AtDesk<'_, CriticalSectionRawMutex>) + Send + 'static,
+    ) -> io::Result<Self> {
+        let listen = |port| {
+            let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+            listener.set_nonblocking(true)?;
+            io::Result::Ok((listener.local_addr()?, listener))
+        };
+        let (address, listener) = listen(options.port)?;
+        let (http, http_listener) = listen(options.http_port)?;
+        let desk = Arc::new(Desk::new(BOARD, &Machine::news_8000()));
         let image = Arc::new(ImageCell::new(RefCell::new(options.image)));
         let control = Control::new(options.access);
         let control = Arc::new(ControlCell::new(RefCell::new(control)));
@@ -106,9 +154,12 @@ impl Board {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()?;
-        let listener = {
+        let (listener, http_listener) = {
             let _context = runtime.enter();
-            TcpListener::from_std(listener)?
+            (
+                TcpListener::from_std(listener)?,
+                TcpListener::from_std(http_listener)?,
+            )
         };
         let server = Arc::new(Server {
             listener,
@@ -122,17 +173,28 @@ impl Board {
             runtime.spawn(server.clone().serve());
         }
         let (stop_links, stopped) = oneshot::channel();
-        let links = thread::Builder::new().name("links".into()).spawn(move || {
-            // What was spawned ends with the runtime.
-            let _ = runtime.block_on(stopped);
+        let links = thread::Builder::new().name("links".into()).spawn({
+            let (server, desk) = (server, desk.clone());
+            move || {
+                let local = LocalSet::new();
+                http::start(&local, http_listener, server, desk);
+                // What was spawned ends with the runtime.
+                let _ = local.block_on(&runtime, stopped);
+            }
         })?;
         let (stop_steps, stopped) = mpsc::channel();
         let steps = thread::Builder::new().name("steps".into()).spawn({
             let image = image.clone();
+            let control = control.clone();
+            let step = move |image: &mut Image| {
+                let (control, desk) = (&*control, &*desk);
+                step(image, AtDesk { control, desk });
+            };
             move || pace(&stopped, STEP.div_f64(options.pace), &image, step)
         })?;
         Ok(Self {
             address,
+            http,
             image,
             control,
             running: Some(Running {
@@ -163,11 +225,10 @@ impl Drop for Board {
     }
 }
 
-/// The step that simulates the machine of [`Options::default`] at power-up, and keeps a journal.
-pub fn simulator(journal: impl Journal + Send + 'static) -> impl FnMut(&mut Image) + Send {
-    let mut lockstep = Lockstep::new(&Machine::news_8000(), &Options::default().image, journal)
-        .expect("a preset is valid");
-    move |image| lockstep.cycle(image)
+/// The simulator of the machine of [`Options::default`].
+fn power_up<J: Journal>(journal: J) -> Lockstep<J> {
+    Lockstep::new(&Machine::news_8000(), &Options::default().image, journal)
+        .expect("a preset is valid")
 }
 
 /// Steps at whole multiples of the period after the start. A late step is made up for, in its turn, and so the
@@ -195,16 +256,20 @@ struct Server {
 }
 
 impl Server {
+    fn service(&self) -> Service<'_, CriticalSectionRawMutex> {
+        Service {
+            image: &self.image,
+            control: &self.control,
+        }
+    }
+
     /// A client, where it may come in.
     fn enter(&self, from: SocketAddr) -> Option<link::Client<'_, CriticalSectionRawMutex>> {
         let SocketAddr::V4(from) = from else {
             return None;
         };
-        let service = Service {
-            image: &self.image,
-            control: &self.control,
-        };
-        service.enter(Peer::Ip(*from.ip()), Protocol::ModbusTcp)
+        self.service()
+            .enter(Peer::Ip(*from.ip()), Protocol::ModbusTcp)
     }
 
     /// One client after the other. As on the other boards this is a task of its own for good, not for one client:

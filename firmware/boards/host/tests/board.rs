@@ -86,7 +86,7 @@ fn a_port_that_is_taken_is_an_error() {
 fn the_program_says_where_it_is_and_ends_on_a_signal() {
     for signal in ["-INT", "-TERM"] {
         let mut program = Command::new(env!("CARGO_BIN_EXE_board_host"))
-            .args(["--port", "0"])
+            .args(["--port", "0", "--http-port", "0"])
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -94,13 +94,16 @@ fn the_program_says_where_it_is_and_ends_on_a_signal() {
         BufReader::new(program.stdout.take().unwrap())
             .read_line(&mut line)
             .unwrap();
-        let address: SocketAddr = line
+        let (modbus, http) = line
             .trim_end()
             .strip_prefix("ready modbus=")
-            .and_then(|address| address.parse().ok())
+            .and_then(|rest| rest.split_once(" http=http://"))
             .unwrap();
-        assert!(address.ip().is_loopback());
-        let _client = TcpStream::connect(address).unwrap();
+        let _clients = [modbus, http].map(|address| {
+            let address: SocketAddr = address.parse().unwrap();
+            assert!(address.ip().is_loopback());
+            TcpStream::connect(address).unwrap()
+        });
         let id = program.id().to_string();
         assert!(
             Command::new("kill")

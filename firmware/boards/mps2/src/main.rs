@@ -12,6 +12,7 @@
 #![allow(unsafe_code)]
 
 mod failure;
+mod http;
 mod interrupts;
 mod lan9118;
 mod net;

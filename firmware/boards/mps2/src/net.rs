@@ -1,4 +1,4 @@
-//! The network: one Ethernet interface with a static address, and a TCP server on the Modbus port.
+//! The network: one Ethernet interface with a static address, a TCP server on the Modbus port, and the HMI's.
 //!
 //! Does not know what is said on a connection: the library does. There is no DHCP.
 
@@ -9,18 +9,21 @@ use firmware::link::Service;
 use firmware::net::{self, Places};
 use static_cell::StaticCell;
 
+use crate::http::{self, LocalDesk};
 use crate::lan9118::Lan9118;
 
 /// The first guest's address on QEMU's user network; QEMU forwards a port of the host to it.
 const ADDRESS: Ipv4Cidr = Ipv4Cidr::new(Ipv4Address::new(10, 0, 2, 15), 24);
 const GATEWAY: Ipv4Address = Ipv4Address::new(10, 0, 2, 2);
 
+const SOCKETS: usize = net::MODBUS_SOCKETS + http::SOCKETS;
+
 /// What the background's tasks share: they take turns, so a lock need not keep anything off.
 pub type LocalService = Service<'static, NoopRawMutex>;
 
 /// Starts the network. Runs in the background, where everything of the network stays.
-pub fn start(spawner: Spawner, service: LocalService) {
-    static RESOURCES: StaticCell<StackResources<{ net::MODBUS_SOCKETS }>> = StaticCell::new();
+pub fn start(spawner: Spawner, service: LocalService, desk: &'static LocalDesk) {
+    static RESOURCES: StaticCell<StackResources<SOCKETS>> = StaticCell::new();
     static PLACES: StaticCell<Places<NoopRawMutex>> = StaticCell::new();
 
     let Ok(driver) = Lan9118::start() else {
@@ -42,6 +45,7 @@ pub fn start(spawner: Spawner, service: LocalService) {
     for _ in 0..net::MODBUS_SOCKETS {
         spawner.spawn(serve_modbus(stack, service, places).expect("as many tasks as sockets"));
     }
+    http::start(spawner, stack, service, desk);
 }
 
 #[embassy_executor::task]

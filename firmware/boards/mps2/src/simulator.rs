@@ -11,6 +11,7 @@ use embassy_executor::Spawner;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::SPANS;
+use firmware::hmi::desk::{AtDesk, Board};
 use firmware::journal::Journal;
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
@@ -19,10 +20,10 @@ use model_core::drive::Drive;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::logic::{Fault, Logic, Mode, Refusal};
 use model_core::machine::Machine;
-use model_core::real;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
+use crate::http::LocalDesk;
 use crate::net::LocalService;
 use crate::trace::Traced;
 
@@ -43,9 +44,14 @@ pub const SCALAR: &str = if cfg!(target_abi = "eabihf") {
     "fixed point"
 };
 
-/// Everything around the plant computes in SI.
-type Si = <Scalar as real::Scalar>::Si;
-type Exchange = tasks::Exchange<Si>;
+type Exchange = tasks::Exchange<Scalar>;
+
+/// What this board tells about itself.
+const BOARD: Board = Board {
+    name: "Cortex-M in QEMU (mps2)",
+    version: env!("CARGO_PKG_VERSION"),
+    reset: "power-up",
+};
 
 /// What the tasks share, made once.
 pub fn exchange() -> &'static Exchange {
@@ -61,7 +67,7 @@ fn machine() -> Machine {
 #[embassy_executor::task]
 pub async fn plant(start: Instant, exchange: &'static Exchange) {
     match Plant::<Scalar, SPANS>::new(&machine()) {
-        Ok(mut plant) => tasks::plant::<Traced, _, _>(start, &mut plant, exchange).await,
+        Ok(mut plant) => tasks::plant::<Traced, _>(start, &mut plant, exchange).await,
         Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
     }
 }
@@ -77,23 +83,29 @@ pub async fn drive(start: Instant, exchange: &'static Exchange) {
 pub async fn background(exchange: &'static Exchange) {
     static IMAGE: StaticCell<LocalImage> = StaticCell::new();
     static CONTROL: StaticCell<ControlCell<NoopRawMutex>> = StaticCell::new();
+    static DESK: StaticCell<LocalDesk> = StaticCell::new();
 
     let image = &*IMAGE.init(ImageCell::new(RefCell::new(Image {
         commands: Commands::of(&machine()),
         feedback: Feedback::default(),
     })));
     let control = &*CONTROL.init(ControlCell::new(RefCell::new(Control::default())));
+    let service = LocalService { image, control };
+    let desk = &*DESK.init(LocalDesk::new(BOARD, &machine()));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    spawner.spawn(logic(exchange, image).expect("first"));
+    spawner.spawn(logic(exchange, service, desk).expect("first"));
     spawner.spawn(crate::pace::pace().expect("first"));
-    crate::net::start(spawner, LocalService { image, control });
+    crate::net::start(spawner, service, desk);
 }
 
 #[embassy_executor::task]
-async fn logic(exchange: &'static Exchange, image: &'static LocalImage) {
+async fn logic(exchange: &'static Exchange, service: LocalService, desk: &'static LocalDesk) {
+    let control = service.control;
+    let mut at_desk = AtDesk { control, desk };
     let mut logic = Logic::new(&machine());
-    tasks::logic::<Traced, _, _>(&mut logic, exchange, image, &mut Log).await;
+    let image = service.image;
+    tasks::logic::<Traced, _, _>(&mut logic, exchange, image, &mut Log, &mut at_desk).await;
 }
 
 /// The journal goes to the log: commands for a replay, states for people.

@@ -70,7 +70,7 @@ pub fn service(machine: &Machine) -> LocalService {
 #[embassy_executor::task]
 async fn plant(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
     match Plant::<Scalar, SPANS>::new(machine) {
-        Ok(mut plant) => tasks::plant::<Cycles, _, _>(start, &mut plant, exchange).await,
+        Ok(mut plant) => tasks::plant::<Cycles, _>(start, &mut plant, exchange).await,
         Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
     }
 }
@@ -88,7 +88,8 @@ pub async fn logic(
     exchange: &'static Exchange,
     image: &'static ImageCell<NoopRawMutex>,
 ) {
-    tasks::logic::<Cycles, _, _>(&mut Logic::new(machine), exchange, image, &mut Log).await;
+    let logic = &mut Logic::new(machine);
+    tasks::logic::<Cycles, _, _>(logic, exchange, image, &mut Log, &mut ()).await;
 }
 
 /// The journal goes to the log.

@@ -1,0 +1,8 @@
+//! The page in a real browser, on the firmware in QEMU. `cargo winder test` runs it.
+//!
+//! Not here: the HTTP API by itself. What the page claims is held against the image that a PLC reads over Modbus TCP.
+
+mod bench;
+mod chromium;
+mod looks;
+mod work;
