@@ -1,13 +1,15 @@
-//! What boards with embassy's network stack share: where the address comes from, and the Modbus server.
+//! What boards with embassy's network stack share: where the address comes from, the Modbus server, the HMI's.
 //!
 //! Not here: the network device, and the stack that a board builds around it; what is said on a connection, which is
-//! the link's session. There is no IPv6 and no queue of connections: with every socket busy the next client is refused.
+//! the link's session and the HMI's. There is no IPv6 and no queue of connections: with every socket busy the next
+//! client is refused.
 
 use embassy_net::tcp::TcpSocket;
 use embassy_net::{ConfigV4, IpAddress, Ipv4Address, Ipv4Cidr, Stack, StaticConfigV4};
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::{Duration, with_timeout};
 
+use crate::hmi::{self, Hmi};
 use crate::link::Service;
 use crate::link::control::{Peer, Protocol};
 use crate::link::modbus::tcp::{End, Timeouts, session};
@@ -23,6 +25,18 @@ pub const MODBUS_SOCKETS: usize = MODBUS_CLIENTS + 1;
 /// More than two of the longest Modbus frames (260 bytes), in each direction. Small enough that all sockets together
 /// fit into a network device's receive FIFO of 10 KiB, so that clients alone cannot overrun it.
 const BUFFER_BYTES: usize = 768;
+
+/// HTTP, from the IANA registry.
+const HTTP_PORT: u16 = 80;
+/// Connections of browsers at once: each of three has a stream and some for what it asks.
+pub const HTTP_CONNECTIONS: usize = 12;
+/// One more listens, as for Modbus.
+pub const HTTP_SOCKETS: usize = HTTP_CONNECTIONS + 1;
+/// Requests are short, and what is long of them may come in parts: together with Modbus's, the windows do not overrun
+/// a receive FIFO of 10 KiB.
+const HTTP_RX_BYTES: usize = 256;
+/// What a browser loads comes in pieces of two frames.
+const HTTP_TX_BYTES: usize = 2 * 1460;
 
 /// A silent client is asked whether it is there this often …
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
@@ -68,6 +82,56 @@ pub async fn serve_modbus<M: RawMutex>(
         // Whatever state it is in: the socket must be closed to listen again.
         socket.abort();
         let _ = with_timeout(CLOSING, socket.flush()).await;
+    }
+}
+
+/// The places of the browsers' connections.
+pub type HttpPlaces<M> = Seats<M, HTTP_CONNECTIONS>;
+
+/// What one of the HMI's sockets needs; a board has [`HTTP_SOCKETS`].
+pub struct HttpBuffers {
+    rx: [u8; HTTP_RX_BYTES],
+    tx: [u8; HTTP_TX_BYTES],
+    http: [u8; hmi::BUFFER_BYTES],
+}
+
+impl HttpBuffers {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            rx: [0; _],
+            tx: [0; _],
+            http: [0; _],
+        }
+    }
+}
+
+impl Default for HttpBuffers {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// One connection after the other: the task of one of the HMI's sockets.
+pub async fn serve_http<M: RawMutex>(
+    stack: Stack<'_>,
+    hmi: Hmi<'_, M>,
+    places: &HttpPlaces<M>,
+    buffers: &mut HttpBuffers,
+) -> ! {
+    let HttpBuffers { rx, tx, http } = buffers;
+    loop {
+        let mut socket = TcpSocket::new(stack, rx, tx);
+        socket.set_keep_alive(Some(KEEP_ALIVE));
+        socket.set_timeout(Some(TIMEOUT));
+        // A sample is one write: holding it back for more would only delay it.
+        socket.set_nagle_enabled(false);
+        if socket.accept(HTTP_PORT).await.is_ok() {
+            let place = places.take();
+            let session = hmi::serve(socket, http, hmi, || place.answered());
+            // Displaced, the connection ends with the session.
+            let _ = place.hold(session).await;
+        }
     }
 }
 

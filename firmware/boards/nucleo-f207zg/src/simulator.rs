@@ -15,16 +15,13 @@ use model_core::fixed::Word;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::logic::Logic;
 use model_core::machine::Machine;
-use model_core::real::Scalar;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
 use crate::net::{self, LocalService};
 
-/// Everything around the plant computes in SI.
-type Si = <Word as Scalar>::Si;
 /// What the tasks hand to each other.
-pub type Exchange = tasks::Exchange<Si>;
+pub type Exchange = tasks::Exchange<Word>;
 
 type LocalImage = ImageCell<NoopRawMutex>;
 
@@ -53,7 +50,7 @@ fn machine() -> Machine {
 #[embassy_executor::task]
 pub async fn plant(start: Instant, exchange: &'static Exchange) {
     match Plant::<Word, SPANS>::new(&machine()) {
-        Ok(mut plant) => tasks::plant::<Cycles, _, _>(start, &mut plant, exchange).await,
+        Ok(mut plant) => tasks::plant::<Cycles, _>(start, &mut plant, exchange).await,
         Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
     }
 }
@@ -83,5 +80,12 @@ pub async fn background(exchange: &'static Exchange, ethernet: net::Resources) {
 
 #[embassy_executor::task]
 async fn logic(exchange: &'static Exchange, image: &'static LocalImage) {
-    tasks::logic::<Cycles, _, _>(&mut Logic::new(&machine()), exchange, image, &mut ()).await;
+    tasks::logic::<Cycles, _, _>(
+        &mut Logic::new(&machine()),
+        exchange,
+        image,
+        &mut (),
+        &mut (),
+    )
+    .await;
 }

@@ -24,6 +24,7 @@
 
 mod clock;
 mod failure;
+mod http;
 mod memory;
 mod net;
 mod panel;
@@ -80,10 +81,11 @@ fn main() -> ! {
     };
     memory::prepare(&mut core);
     let p = embassy_stm32::init(clock::config());
+    let reset = failure::reset_reason();
     defmt::info!(
         "paper winder simulator {=str} on NUCLEO-H743ZI2; {=str}",
         env!("CARGO_PKG_VERSION"),
-        failure::reset_reason()
+        reset
     );
     for (interrupt, priority) in [
         (interrupt::TIM3, Priority::P1),
@@ -132,8 +134,9 @@ fn main() -> ! {
     let timed = [PLANT.start(interrupt::UART7), DRIVE.start(interrupt::UART8)];
     let exchange = simulator::start(timed, start, machine, wires);
     let background = BACKGROUND.start(interrupt::SAI1);
-    background
-        .spawn(all_else(machine, exchange, panel, ethernet, settings.network).expect("first"));
+    background.spawn(
+        all_else(machine, exchange, panel, ethernet, settings.network, reset).expect("first"),
+    );
 
     loop {
         cortex_m::asm::wfi();
@@ -148,11 +151,13 @@ async fn all_else(
     panel: Panel,
     ethernet: net::Resources,
     network: Network,
+    reset: &'static str,
 ) {
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     let service = simulator::service(machine);
-    spawner.spawn(simulator::logic(machine, exchange, service.image).expect("first"));
+    let desk = simulator::desk(machine, reset);
+    spawner.spawn(simulator::logic(machine, exchange, service, desk).expect("first"));
     spawner.spawn(panel::run(panel, exchange).expect("first"));
-    net::start(spawner, ethernet, network, service);
+    net::start(spawner, ethernet, network, service, desk);
 }

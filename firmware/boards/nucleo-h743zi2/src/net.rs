@@ -17,6 +17,7 @@ use firmware::net::{self, Places};
 use firmware::store::Network;
 use static_cell::StaticCell;
 
+use crate::http::{self, LocalDesk};
 use crate::memory;
 
 bind_interrupts!(struct Irqs {
@@ -26,8 +27,8 @@ bind_interrupts!(struct Irqs {
 
 type Device = Ethernet<'static, ETH, GenericPhy<Sma<'static, ETH_SMA>>>;
 
-/// Of DHCP.
-const OTHER_SOCKETS: usize = 1;
+/// With that of DHCP.
+const SOCKETS: usize = net::MODBUS_SOCKETS + net::HTTP_SOCKETS + 1;
 /// What the background's tasks share: they take turns, so a lock need not keep anything off.
 pub type LocalService = Service<'static, NoopRawMutex>;
 
@@ -56,9 +57,14 @@ pub struct Resources {
 }
 
 /// Starts the network. Runs in the background, where everything of the network stays.
-pub fn start(spawner: Spawner, r: Resources, network: Network, service: LocalService) {
-    static RESOURCES: StaticCell<StackResources<{ net::MODBUS_SOCKETS + OTHER_SOCKETS }>> =
-        StaticCell::new();
+pub fn start(
+    spawner: Spawner,
+    r: Resources,
+    network: Network,
+    service: LocalService,
+    desk: &'static LocalDesk,
+) {
+    static RESOURCES: StaticCell<StackResources<SOCKETS>> = StaticCell::new();
     static PLACES: StaticCell<Places<NoopRawMutex>> = StaticCell::new();
 
     let seed = Rng::new(r.rng, Irqs).next_u64();
@@ -91,6 +97,7 @@ pub fn start(spawner: Spawner, r: Resources, network: Network, service: LocalSer
     for _ in 0..net::MODBUS_SOCKETS {
         spawner.spawn(serve_modbus(stack, service, places).expect("as many tasks as sockets"));
     }
+    http::start(spawner, stack, service, desk);
 }
 
 /// Of the chip's own number, in the range that everybody may use (IEEE 802, locally administered).

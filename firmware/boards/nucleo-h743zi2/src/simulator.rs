@@ -8,6 +8,7 @@ use cortex_m::peripheral::DWT;
 use embassy_executor::SendSpawner;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
+use firmware::hmi::desk::{AtDesk, Board};
 use firmware::journal::Journal;
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
@@ -20,6 +21,7 @@ use model_core::machine::Machine;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
+use crate::http::LocalDesk;
 use crate::net::LocalService;
 use crate::wires::Wires;
 
@@ -86,10 +88,24 @@ async fn drive(start: Instant, machine: &'static Machine, exchange: &'static Exc
 pub async fn logic(
     machine: &'static Machine,
     exchange: &'static Exchange,
-    image: &'static ImageCell<NoopRawMutex>,
+    service: LocalService,
+    desk: &'static LocalDesk,
 ) {
-    let logic = &mut Logic::new(machine);
-    tasks::logic::<Cycles, _, _>(logic, exchange, image, &mut Log, &mut ()).await;
+    let control = service.control;
+    let mut at_desk = AtDesk { control, desk };
+    let (mut logic, image) = (Logic::new(machine), service.image);
+    tasks::logic::<Cycles, _, _>(&mut logic, exchange, image, &mut Log, &mut at_desk).await;
+}
+
+/// The HMI's desk.
+pub fn desk(machine: &Machine, reset: &'static str) -> &'static LocalDesk {
+    static DESK: StaticCell<LocalDesk> = StaticCell::new();
+    let board = Board {
+        name: "NUCLEO-H743ZI2",
+        version: env!("CARGO_PKG_VERSION"),
+        reset,
+    };
+    DESK.init(LocalDesk::new(board, machine))
 }
 
 /// The journal goes to the log.
