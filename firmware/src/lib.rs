@@ -8,6 +8,7 @@
 extern crate std;
 
 pub mod journal;
+pub mod life;
 pub mod link;
 pub mod lockstep;
 pub mod mailbox;

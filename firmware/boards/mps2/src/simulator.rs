@@ -12,6 +12,7 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::SPANS;
 use firmware::journal::Journal;
+use firmware::life::Started;
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
 use firmware::tasks;
@@ -25,6 +26,7 @@ use static_cell::StaticCell;
 
 use crate::net::LocalService;
 use crate::trace::Traced;
+use crate::watchdog;
 
 /// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
 type LocalImage = ImageCell<NoopRawMutex>;
@@ -48,9 +50,9 @@ type Si = <Scalar as real::Scalar>::Si;
 type Exchange = tasks::Exchange<Si>;
 
 /// What the tasks share, made once.
-pub fn exchange() -> &'static Exchange {
+pub fn exchange(started: Started) -> &'static Exchange {
     static EXCHANGE: StaticCell<Exchange> = StaticCell::new();
-    EXCHANGE.init(Exchange::default())
+    EXCHANGE.init(Exchange::new(&watchdog::LIFE, started))
 }
 
 fn machine() -> Machine {
@@ -87,6 +89,7 @@ pub async fn background(exchange: &'static Exchange) {
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(exchange, image).expect("first"));
     spawner.spawn(crate::pace::pace().expect("first"));
+    spawner.spawn(watchdog::feed().expect("first"));
     crate::net::start(spawner, LocalService { image, control });
 }
 
