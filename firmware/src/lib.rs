@@ -10,6 +10,7 @@ extern crate std;
 pub mod attendant;
 pub mod hmi;
 pub mod journal;
+pub mod life;
 pub mod link;
 pub mod lockstep;
 pub mod mailbox;

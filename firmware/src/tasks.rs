@@ -29,6 +29,7 @@ use model_core::simulator::{Plant, Record, logic_tick};
 use crate::SPANS;
 use crate::attendant::{Attendant, Done, Order};
 use crate::journal::{Journal, Observer};
+use crate::life::{Life, Started, Task};
 use crate::link::ImageCell;
 use crate::mailbox::Mailbox;
 use crate::state::State;
@@ -142,10 +143,13 @@ pub struct Exchange<R: Scalar> {
     plant_times: Times,
     drive_times: Times,
     logic_times: Times,
+    life: &'static Life,
+    started: Started,
 }
 
-impl<R: Scalar> Default for Exchange<R> {
-    fn default() -> Self {
+impl<R: Scalar> Exchange<R> {
+    /// Between tasks that show `life`, of a firmware that has `started`.
+    pub fn new(life: &'static Life, started: Started) -> Self {
         Self {
             actuators: Mailbox::new(Actuators::default()),
             measurements: Mailbox::new((Measurements::default(), Record::default())),
@@ -166,6 +170,8 @@ impl<R: Scalar> Default for Exchange<R> {
             plant_times: Times::default(),
             drive_times: Times::default(),
             logic_times: Times::default(),
+            life,
+            started,
         }
     }
 }
@@ -219,17 +225,27 @@ struct Rate<'a, W> {
     period: Duration,
     late: Duration,
     began: u32,
+    task: Task,
+    life: &'static Life,
     times: &'a Times,
     stopwatch: PhantomData<W>,
 }
 
 impl<'a, W: Stopwatch> Rate<'a, W> {
-    fn new(start: Instant, period_ms: u32, times: &'a Times) -> Self {
+    fn new(
+        start: Instant,
+        period_ms: u32,
+        task: Task,
+        life: &'static Life,
+        times: &'a Times,
+    ) -> Self {
         Self {
             due: start,
             period: Duration::from_millis(u64::from(period_ms)),
             late: Duration::MIN,
             began: 0,
+            task,
+            life,
             times,
             stopwatch: PhantomData,
         }
@@ -239,7 +255,9 @@ impl<'a, W: Stopwatch> Rate<'a, W> {
         self.due += self.period;
         Timer::at(self.due).await;
         self.began = W::count();
-        self.late = Instant::now() - self.due;
+        let now = Instant::now();
+        self.late = now - self.due;
+        self.life.see(self.task, now);
     }
 
     fn done(&self) {
@@ -259,7 +277,12 @@ pub async fn plant<W: Stopwatch, R: Scalar>(
     plant: &mut Plant<R, SPANS>,
     exchange: &Exchange<R>,
 ) -> ! {
-    let mut rate = Rate::<W>::new(start, PLANT_PERIOD_MS, &exchange.plant_times);
+    let Exchange {
+        life,
+        plant_times: times,
+        ..
+    } = exchange;
+    let mut rate = Rate::<W>::new(start, PLANT_PERIOD_MS, Task::Plant, life, times);
     let mut number = 0_u32;
     loop {
         rate.release().await;
@@ -281,7 +304,12 @@ pub async fn drive<W: Stopwatch, R: Scalar>(
     drive: &mut Drive<R::Si>,
     exchange: &Exchange<R>,
 ) -> ! {
-    let mut rate = Rate::<W>::new(start, DRIVE_PERIOD_MS, &exchange.drive_times);
+    let Exchange {
+        life,
+        drive_times: times,
+        ..
+    } = exchange;
+    let mut rate = Rate::<W>::new(start, DRIVE_PERIOD_MS, Task::Drive, life, times);
     let mut number = 0_u32;
     loop {
         rate.release().await;
@@ -344,6 +372,9 @@ pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
     journal: &mut impl Journal,
     attendant: &mut impl Attendant,
 ) -> ! {
+    if exchange.started.why.is_by_itself() {
+        logic.restarted();
+    }
     let mut observer = Observer::new(image.lock(|image| image.borrow().commands));
     let times = &exchange.logic_times;
     let mut next = 0;
@@ -353,7 +384,9 @@ pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
         exchange.cycle_from(next).await;
         let began = W::count();
         let cycle = exchange.cycle.get();
-        let late = Instant::now() - cycle.due;
+        let now = Instant::now();
+        let late = now - cycle.due;
+        exchange.life.see(Task::Logic, now);
         times.overrun(cycle.number.wrapping_sub(next));
         next = cycle.number.wrapping_add(1);
 
@@ -527,6 +560,10 @@ impl<R: Scalar> Exchange<R> {
     fn report_times<W: Stopwatch>(&self, feedback: &mut Feedback) {
         let (plant, drive, logic) = (&self.plant_times, &self.drive_times, &self.logic_times);
         let us = |counts: &AtomicU32| counts.load(Ordering::Relaxed) / W::PER_US;
+        let tenths = |counts: &AtomicU32| {
+            let counts = counts.load(Ordering::Relaxed);
+            counts.saturating_mul(10) / W::PER_US
+        };
         let plain = |number: &AtomicU32| number.load(Ordering::Relaxed);
         for (signal, value) in [
             (&image::PLANT_OVERRUNS, plain(&plant.overruns)),
@@ -536,6 +573,13 @@ impl<R: Scalar> Exchange<R> {
             (&image::DRIVE_TIME_MAX, us(&drive.longest)),
             (&image::DRIVE_JITTER_MAX, plain(&drive.latest_us)),
             (&image::LOGIC_OVERRUNS, plain(&logic.overruns)),
+            (&image::LOGIC_TIME_MAX, us(&logic.longest)),
+            (&image::LOGIC_JITTER_MAX, plain(&logic.latest_us)),
+            (&image::PLANT_TIME, tenths(&plant.last)),
+            (&image::DRIVE_TIME, tenths(&drive.last)),
+            (&image::LOGIC_TIME, tenths(&logic.last)),
+            (&image::RESTART, self.started.why.number().into()),
+            (&image::RESTARTS, self.started.times.into()),
         ] {
             feedback.set_word(signal, u16::try_from(value).unwrap_or(u16::MAX));
         }

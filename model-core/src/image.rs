@@ -16,6 +16,7 @@ use crate::logic;
 use crate::machine::Machine;
 use crate::profidrive;
 use crate::real::Real;
+use crate::restart::Restart;
 pub use crate::signal::{Bit, Direction, Kind, Section, Signal};
 
 const fn lower<const N: usize>(name: &str) -> [u8; N] {
@@ -175,6 +176,15 @@ signals! {
     POLLS_200_MS:     Feedback 84, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after 100 to 200 ms";
     POLLS_500_MS:     Feedback 86, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after 200 to 500 ms";
     POLLS_LONGER:     Feedback 88, Simulator, U32, "", 1.0, 0.0 ..= 4294967295.0, "Polls after more than 500 ms";
+
+    // more of what the simulator tells of itself
+    PLANT_TIME:       Feedback 90, Simulator, U16, "µs", 10.0, 0.0 ..= 6553.5, "Last plant activation";
+    DRIVE_TIME:       Feedback 91, Simulator, U16, "µs", 10.0, 0.0 ..= 6553.5, "Last regulator activation";
+    LOGIC_TIME:       Feedback 92, Simulator, U16, "µs", 10.0, 0.0 ..= 6553.5, "Last logic activation";
+    LOGIC_TIME_MAX:   Feedback 93, Simulator, U16, "µs", 1.0, 0.0 ..= 65535.0, "Longest logic activation";
+    LOGIC_JITTER_MAX: Feedback 94, Simulator, U16, "µs", 1.0, 0.0 ..= 65535.0, "Latest start of a logic activation after its drive cycle was due";
+    RESTART:          Feedback 95, Simulator, Code(&Restart::TEXTS), "", 1.0, 0.0 ..= 65535.0, "Why the simulator has started";
+    RESTARTS:         Feedback 96, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Starts by itself since power came";
 }
 
 /// Jog speed at power-up, m/min.

@@ -19,6 +19,7 @@ pub mod machine;
 pub mod plant;
 pub mod profidrive;
 pub mod real;
+pub mod restart;
 pub mod signal;
 pub mod simulator;
 pub mod twin;

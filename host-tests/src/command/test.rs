@@ -39,6 +39,8 @@ pub fn main() -> Result<ExitCode> {
                 "qemu",
                 "--test",
                 "twin",
+                "--test",
+                "watchdog",
             ])
         }),
         ("timing and sizes", || {

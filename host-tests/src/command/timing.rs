@@ -9,6 +9,7 @@ use model_core::image::{
     PLANT_OVERRUNS, PLANT_TICKS, PLANT_TIME_MAX, TRAJECTORY,
 };
 
+use crate::interrupt::Interrupted;
 use crate::setup::{self, Warnings};
 use crate::timing::golden::{self, Outcome};
 use crate::timing::load::{Kind, LOADS, POLLING};
@@ -48,10 +49,16 @@ pub fn main(args: &Args) -> Result<ExitCode> {
     if let Some(ticks) = args.ticks {
         return endure(&firmware, &cores, ticks);
     }
-    let (table, bars) = measure(&firmware, &cores, &loads)?;
+    let (table, bars, missing) = measure(&firmware, &cores, &loads)?;
     let table = golden::with_compiler(&setup::compiler()?, &table);
     print!("{table}");
     let missed = judge(&bars);
+    for what in &missing {
+        println!("\nNot measured: {what}");
+    }
+    if !missing.is_empty() {
+        return Ok(ExitCode::FAILURE);
+    }
     let mut as_kept = true;
     if args.bless {
         golden::keep(TABLE, &table)?;
@@ -142,12 +149,23 @@ fn chosen<'a, T>(names: &[String], all: &'a [T], name: fn(&T) -> &str) -> Result
     Ok(all.iter().filter(wanted).collect())
 }
 
-fn measure(firmware: &Firmware, cores: &[&Core], loads: &[&Kind]) -> Result<(String, Vec<Bar>)> {
-    let (mut table, mut bars) = (String::new(), Vec::new());
+fn measure(
+    firmware: &Firmware,
+    cores: &[&Core],
+    loads: &[&Kind],
+) -> Result<(String, Vec<Bar>, Vec<String>)> {
+    let (mut table, mut bars, mut missing) = (String::new(), Vec::new(), Vec::new());
     for kind in loads {
         let mut all: Vec<(&Core, Measured)> = Vec::new();
         for core in cores {
-            let measured = firmware.measure(core, kind)?;
+            let measured = match firmware.measure(core, kind) {
+                Ok(measured) => measured,
+                Err(error) if error.is::<Interrupted>() => return Err(error),
+                Err(error) => {
+                    missing.push(format!("{} under {}: {error:#}", core.name, kind.name));
+                    continue;
+                }
+            };
             // a string takes all that is written to it
             let _ = writeln!(
                 table,
@@ -167,7 +185,7 @@ fn measure(firmware: &Firmware, cores: &[&Core], loads: &[&Kind]) -> Result<(Str
             bars.push(timing::ratio(kind, m7, m3));
         }
     }
-    Ok((table, bars))
+    Ok((table, bars, missing))
 }
 
 /// Says which bars are missed; whether there are any.

@@ -74,6 +74,17 @@ pub struct Bench {
 impl Bench {
     /// Starts the firmware and lets it run to its first beat.
     pub fn start(files: &Files, core: &Core, elf: &Elf, watch: Watch<'_>) -> Result<Self> {
+        Self::start_with(files, core, elf, watch, &[])
+    }
+
+    /// The same, with words that stand in memory before power comes, by their addresses.
+    pub fn start_with(
+        files: &Files,
+        core: &Core,
+        elf: &Elf,
+        watch: Watch<'_>,
+        memory: &[(u64, u32)],
+    ) -> Result<Self> {
         static BENCHES: AtomicU32 = AtomicU32::new(0);
         let number = BENCHES.fetch_add(1, Ordering::Relaxed);
         let name = |what| format!("winder-{}-{number}-{what}", std::process::id());
@@ -118,6 +129,10 @@ impl Bench {
             .arg(format!("socket,id=passed,path={passed},abstract=on"))
             .arg("-object")
             .arg("filter-mirror,id=mirror,netdev=wire,queue=tx,outdev=passed")
+            .args(memory.iter().flat_map(|(address, word)| {
+                let loader = format!("loader,addr={address:#x},data={word:#x},data-len=4");
+                ["-device".to_owned(), loader]
+            }))
             .arg("-kernel")
             .arg(&files.firmware)
             .stdin(Stdio::from(OwnedFd::from(theirs)))

@@ -93,7 +93,7 @@ const PLC_MAC: [u8; 6] = [0x02, 0, 0, 0, 0, 0x02];
 const MODBUS_PORT: u16 = 502;
 /// The drive cycle from which on the PLC goes on winding: before its script would stop.
 const WINDING: u32 = 39 * 1000 / DRIVE_PERIOD_MS;
-/// Any port of the PLC's.
+/// The ports of the PLC's connections follow this one.
 const PLC_PORT: u16 = 50_000;
 /// Bytes of a TCP buffer: more than the longest Modbus frame.
 const BUFFER: usize = 1024;
@@ -113,6 +113,7 @@ struct Plc {
     requests: VecDeque<Vec<u8>>,
     answer: Vec<u8>,
     waiting: bool,
+    connections: u16,
     transaction: u16,
     polls: u64,
     answers: u64,
@@ -189,6 +190,7 @@ impl Plc {
             requests: VecDeque::new(),
             answer: Vec::new(),
             waiting: false,
+            connections: 0,
             transaction: 0,
             polls: 0,
             answers: 0,
@@ -262,9 +264,15 @@ impl Plc {
         self.interface.poll(now, &mut self.cable, &mut self.sockets);
         let socket = self.sockets.get_mut::<tcp::Socket>(self.socket);
         if !socket.is_open() {
+            // again, where the simulator has lost the connection: nothing is under way any more
+            self.requests.clear();
+            self.answer.clear();
+            self.waiting = false;
+            self.connections += 1;
             let context = self.interface.context();
+            let port = PLC_PORT + self.connections;
             socket
-                .connect(context, (IpAddress::Ipv4(GUEST), MODBUS_PORT), PLC_PORT)
+                .connect(context, (IpAddress::Ipv4(GUEST), MODBUS_PORT), port)
                 .map_err(|error| anyhow!("the PLC cannot connect: {error}"))?;
         }
         if socket.can_recv() {

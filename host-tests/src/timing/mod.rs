@@ -9,6 +9,7 @@
 pub mod bench;
 pub mod elf;
 pub mod golden;
+pub mod hang;
 pub mod load;
 pub mod report;
 pub mod sizes;
@@ -31,6 +32,8 @@ use report::{Seen, Spread};
 
 /// Counts of the boards' stopwatch in a microsecond.
 const COUNTS_PER_US: f64 = 25.0;
+/// Virtual time of an instruction under `-icount shift=1`, s.
+const SECONDS_PER_INSTRUCTION: f64 = 2e-9;
 /// After power-up, before anything is counted, ms.
 const WARM_UP: u64 = 100;
 /// The core that the shares are told of, instructions a second: one in a cycle at 400 MHz.
@@ -313,6 +316,8 @@ impl Measured {
             100.0 * self.executed as f64 / self.seconds / BUDGET,
             100.0 * self.simulator() / BUDGET
         );
+        let deepest = self.rows.values().map(|row| row.stack).max().unwrap_or(0);
+        let _ = writeln!(out, "Stack: at most {deepest} bytes in use.");
         for (place, spread) in self.masked.iter().take(MASKED_SHOWN) {
             let _ = writeln!(
                 out,

@@ -265,6 +265,7 @@ fn no_command_leads_beside_the_table_or_its_limits() {
     let machine = Machine::news_8000();
     let mut chance = Chance(0x9e37_79b9_7f4a_7c15);
     let mut logic = Logic::<f32>::new(&machine);
+    logic.restarted();
     let mut commands = Commands::of(&machine);
     let mut feedback = Feedback::default();
     let mut it = Caricature::default();

@@ -90,6 +90,7 @@ pub const FAULTS: &[Row] = &[
     row(Fault::BrakeRearDrum,   RD,   false, Reaction::NormalStop),
     row(Fault::BrakeFrontDrum,  FD,   false, Reaction::NormalStop),
     row(Fault::UnwindDeviates,  UW,   true,  Reaction::QuickStop),
+    row(Fault::Restarted,       ALL,  false, Reaction::NormalStop),
 ];
 
 /// Drive cycles in a second.

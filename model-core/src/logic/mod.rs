@@ -338,6 +338,11 @@ impl<R: Real> Logic<R> {
         self.tension.reset();
     }
 
+    /// The simulator has restarted by itself: drives off, brakes closed, and nothing starts before that is acknowledged.
+    pub fn restarted(&mut self) {
+        self.faults.latch(Fault::Restarted);
+    }
+
     fn acknowledge(&mut self, sight: &Sight<R>) {
         let words = control_words(sight.commands).into_array();
         let by_section = words.iter().any(|w| w & stw1::ACKNOWLEDGE != 0);

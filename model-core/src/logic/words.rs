@@ -260,6 +260,7 @@ codes! {
         BrakeRearDrum: "the rear drum's brake does not follow its command",
         BrakeFrontDrum: "the front drum's brake does not follow its command",
         UnwindDeviates: "the unwind's speed does not fit the web's",
+        Restarted: "the simulator has restarted by itself",
     }
 }
 

@@ -19,9 +19,11 @@ use core::task::Context;
 use atomic_waker::AtomicWaker;
 use embassy_net_driver::{Capabilities, HardwareAddress, LinkState};
 use embassy_time::{Duration, Instant};
+use firmware::life::Task;
 
 use crate::interrupts::{self, Interrupt};
 use crate::trace;
+use crate::watchdog::LIFE;
 
 /// Locally administered; there is one simulator on QEMU's private network.
 const ADDRESS: [u8; 6] = [0x02, 0x00, 0x00, 0x00, 0x05, 0x00];
@@ -172,6 +174,11 @@ pub extern "C" fn on_interrupt() {
     });
 }
 
+/// Has the network's task ask for a frame, which shows that it lives.
+pub fn ask() {
+    FRAME_RECEIVED.wake();
+}
+
 /// No chip answers at the address.
 #[derive(Debug, defmt::Format)]
 pub struct NotFound;
@@ -222,9 +229,11 @@ impl embassy_net_driver::Driver for Lan9118 {
     type TxToken<'a> = TxToken<'a>;
 
     fn receive(&mut self, cx: &mut Context) -> Option<(RxToken<'_>, TxToken<'_>)> {
+        let now = Instant::now();
+        LIFE.see(Task::Network, now);
         if self.burst == BURST {
             let next = self.window + WINDOW;
-            if Instant::now() < next {
+            if now < next {
                 embassy_time_driver::schedule_wake(next.as_ticks(), cx.waker());
                 return None;
             }
@@ -240,7 +249,7 @@ impl embassy_net_driver::Driver for Lan9118 {
             }
         }
         if self.burst == 0 {
-            self.window = Instant::now();
+            self.window = now;
         }
         self.burst += 1;
         Some((

@@ -23,10 +23,13 @@ mod stopwatch;
 mod time_driver;
 mod trace;
 mod uart_log;
+mod watchdog;
 
 use embassy_executor::InterruptExecutor;
 use embassy_time::{Duration, Instant};
+use firmware::life::Task;
 use interrupts::Interrupt;
+use model_core::restart::Restart;
 
 static PLANT: InterruptExecutor = InterruptExecutor::new();
 static DRIVE: InterruptExecutor = InterruptExecutor::new();
@@ -68,11 +71,26 @@ fn main() -> ! {
         simulator::SCALAR
     );
 
+    let started = watchdog::started();
+    if started.why.is_by_itself() {
+        defmt::warn!(
+            "restarted: {=str}",
+            Restart::TEXTS[usize::from(started.why.number())]
+        );
+    }
+
+    watchdog::start();
     let start = Instant::now() + SETTLING;
     let plant = PLANT.start(Interrupt::Plant);
     let drive = DRIVE.start(Interrupt::Drive);
     let background = BACKGROUND.start(Interrupt::Background);
-    let exchange = simulator::exchange();
+    match watchdog::ordered_to_hang(started) {
+        Some(Task::Plant) => plant.spawn(watchdog::hang().expect("first")),
+        Some(Task::Drive) => drive.spawn(watchdog::hang().expect("first")),
+        Some(_) => background.spawn(watchdog::hang().expect("first")),
+        None => {}
+    }
+    let exchange = simulator::exchange(started);
     plant.spawn(simulator::plant(start, exchange).expect("first"));
     drive.spawn(simulator::drive(start, exchange).expect("first"));
     background.spawn(simulator::background(exchange).expect("first"));

@@ -13,6 +13,7 @@ use embassy_time::Instant;
 use firmware::SPANS;
 use firmware::hmi::desk::{AtDesk, Board};
 use firmware::journal::Journal;
+use firmware::life::Started;
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
 use firmware::tasks;
@@ -26,6 +27,7 @@ use static_cell::StaticCell;
 use crate::http::LocalDesk;
 use crate::net::LocalService;
 use crate::trace::Traced;
+use crate::watchdog;
 
 /// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
 type LocalImage = ImageCell<NoopRawMutex>;
@@ -54,9 +56,9 @@ const BOARD: Board = Board {
 };
 
 /// What the tasks share, made once.
-pub fn exchange() -> &'static Exchange {
+pub fn exchange(started: Started) -> &'static Exchange {
     static EXCHANGE: StaticCell<Exchange> = StaticCell::new();
-    EXCHANGE.init(Exchange::default())
+    EXCHANGE.init(Exchange::new(&watchdog::LIFE, started))
 }
 
 fn machine() -> Machine {
@@ -96,6 +98,7 @@ pub async fn background(exchange: &'static Exchange) {
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(exchange, service, desk).expect("first"));
     spawner.spawn(crate::pace::pace().expect("first"));
+    spawner.spawn(watchdog::feed().expect("first"));
     crate::net::start(spawner, service, desk);
 }
 

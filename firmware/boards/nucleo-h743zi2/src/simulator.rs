@@ -10,6 +10,7 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::hmi::desk::{AtDesk, Board};
 use firmware::journal::Journal;
+use firmware::life::{Life, Started};
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
 use firmware::tasks::{self, Stopwatch};
@@ -47,7 +48,8 @@ pub fn start(
     wires: Wires,
 ) -> &'static Exchange {
     static EXCHANGE: StaticCell<Exchange> = StaticCell::new();
-    let exchange = &*EXCHANGE.init(Exchange::default());
+    static LIFE: Life = Life::new();
+    let exchange = &*EXCHANGE.init(Exchange::new(&LIFE, Started::default()));
     plant_at.spawn(plant(start, machine, exchange).expect("first"));
     // after the plant, which the same alarm wakes
     plant_at.spawn(crate::wires::run(start, wires, exchange).expect("first"));
