@@ -93,7 +93,7 @@ fn main() -> ! {
     let exchange = simulator::exchange(started);
     plant.spawn(simulator::plant(start, exchange).expect("first"));
     drive.spawn(simulator::drive(start, exchange).expect("first"));
-    background.spawn(simulator::background(exchange).expect("first"));
+    background.spawn(simulator::background(exchange, started).expect("first"));
 
     // Not an executor: embassy's idles in WFE, on which QEMU spins.
     loop {

@@ -21,6 +21,7 @@ use model_core::drive::Drive;
 use model_core::image::{Commands, Feedback, Image};
 use model_core::logic::{Fault, Logic, Mode, Refusal};
 use model_core::machine::Machine;
+use model_core::restart::Restart;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
@@ -47,13 +48,6 @@ pub const SCALAR: &str = if cfg!(target_abi = "eabihf") {
 };
 
 type Exchange = tasks::Exchange<Scalar>;
-
-/// What this board tells about itself.
-const BOARD: Board = Board {
-    name: "Cortex-M in QEMU (mps2)",
-    version: env!("CARGO_PKG_VERSION"),
-    reset: "power-up",
-};
 
 /// What the tasks share, made once.
 pub fn exchange(started: Started) -> &'static Exchange {
@@ -82,7 +76,7 @@ pub async fn drive(start: Instant, exchange: &'static Exchange) {
 
 /// Everything that may wait: logic, network, and the beat for the pace.
 #[embassy_executor::task]
-pub async fn background(exchange: &'static Exchange) {
+pub async fn background(exchange: &'static Exchange, started: Started) {
     static IMAGE: StaticCell<LocalImage> = StaticCell::new();
     static CONTROL: StaticCell<ControlCell<NoopRawMutex>> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
@@ -93,7 +87,12 @@ pub async fn background(exchange: &'static Exchange) {
     })));
     let control = &*CONTROL.init(ControlCell::new(RefCell::new(Control::default())));
     let service = LocalService { image, control };
-    let desk = &*DESK.init(LocalDesk::new(BOARD, &machine()));
+    let board = Board {
+        name: "Cortex-M in QEMU (mps2)",
+        version: env!("CARGO_PKG_VERSION"),
+        reset: Restart::TEXTS[usize::from(started.why.number())],
+    };
+    let desk = &*DESK.init(LocalDesk::new(board, &machine()));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(exchange, service, desk).expect("first"));

@@ -20,6 +20,7 @@
 
 mod net;
 mod simulator;
+mod watchdog;
 
 use core::panic::PanicInfo;
 
@@ -114,9 +115,10 @@ fn main() -> ! {
     }
 
     let start = Instant::now() + SETTLING;
-    let exchange = simulator::exchange();
+    let exchange = simulator::exchange(watchdog::started());
     let plant = PLANT.start(interrupt::UART4);
     plant.spawn(simulator::plant(start, exchange).expect("first"));
+    plant.spawn(watchdog::run(p.IWDG).expect("first"));
     let drive = DRIVE.start(interrupt::UART5);
     drive.spawn(simulator::drive(start, exchange).expect("first"));
     let ethernet = net::Resources {

@@ -4,6 +4,7 @@
 //! address comes when the cable does.
 
 use embassy_executor::Spawner;
+use embassy_futures::join::join;
 use embassy_net::{Config, Runner, Stack, StackResources};
 use embassy_stm32::eth::{self, Ethernet, GenericPhy, PacketQueue, Sma};
 use embassy_stm32::peripherals::{
@@ -12,10 +13,14 @@ use embassy_stm32::peripherals::{
 use embassy_stm32::rng::{self, Rng};
 use embassy_stm32::{Peri, bind_interrupts, uid};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_time::{Instant, Timer};
+use firmware::life::{PATIENCE, Task};
 use firmware::link::Service;
 use firmware::net::{self, Places};
 use firmware::store::Network;
 use static_cell::StaticCell;
+
+use crate::watchdog;
 
 bind_interrupts!(struct Irqs {
     ETH => eth::InterruptHandler;
@@ -100,9 +105,16 @@ fn hardware_address() -> [u8; 6] {
     [0x02, 0x57, a, b, c, d]
 }
 
+/// The stack's own task, which shows that it lives.
 #[embassy_executor::task]
 async fn run(mut runner: Runner<'static, Device>) -> ! {
-    runner.run().await
+    let lives = async {
+        loop {
+            watchdog::LIFE.see(Task::Network, Instant::now());
+            Timer::after(PATIENCE / 2).await;
+        }
+    };
+    join(runner.run(), lives).await.0
 }
 
 #[embassy_executor::task]

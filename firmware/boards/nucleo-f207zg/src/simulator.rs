@@ -7,6 +7,7 @@ use embassy_executor::Spawner;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::SPANS;
+use firmware::life::Started;
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
 use firmware::tasks::{self, Stopwatch};
@@ -19,6 +20,7 @@ use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
 use crate::net::{self, LocalService};
+use crate::watchdog;
 
 /// What the tasks hand to each other.
 pub type Exchange = tasks::Exchange<Word>;
@@ -37,9 +39,9 @@ impl Stopwatch for Cycles {
 }
 
 /// What the tasks share, made once.
-pub fn exchange() -> &'static Exchange {
+pub fn exchange(started: Started) -> &'static Exchange {
     static EXCHANGE: StaticCell<Exchange> = StaticCell::new();
-    EXCHANGE.init(Exchange::default())
+    EXCHANGE.init(Exchange::new(&watchdog::LIFE, started))
 }
 
 fn machine() -> Machine {

@@ -30,6 +30,7 @@ mod net;
 mod panel;
 mod settings;
 mod simulator;
+mod watchdog;
 mod wires;
 
 // The log: its way out.
@@ -42,6 +43,7 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_time::{Duration, Instant};
 use firmware::store::Network;
 use model_core::machine::Machine;
+use model_core::restart::Restart;
 use panel::Panel;
 use simulator::Exchange;
 use static_cell::StaticCell;
@@ -81,7 +83,8 @@ fn main() -> ! {
     };
     memory::prepare(&mut core);
     let p = embassy_stm32::init(clock::config());
-    let reset = failure::reset_reason();
+    let started = watchdog::started();
+    let reset = Restart::TEXTS[usize::from(started.why.number())];
     defmt::info!(
         "paper winder simulator {=str} on NUCLEO-H743ZI2; {=str}",
         env!("CARGO_PKG_VERSION"),
@@ -132,7 +135,8 @@ fn main() -> ! {
 
     let start = Instant::now() + SETTLING;
     let timed = [PLANT.start(interrupt::UART7), DRIVE.start(interrupt::UART8)];
-    let exchange = simulator::start(timed, start, machine, wires);
+    timed[0].spawn(watchdog::run(p.IWDG1).expect("first"));
+    let exchange = simulator::start(timed, start, machine, wires, started);
     let background = BACKGROUND.start(interrupt::SAI1);
     background.spawn(
         all_else(machine, exchange, panel, ethernet, settings.network, reset).expect("first"),

@@ -10,7 +10,7 @@ use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::hmi::desk::{AtDesk, Board};
 use firmware::journal::Journal;
-use firmware::life::{Life, Started};
+use firmware::life::Started;
 use firmware::link::control::Control;
 use firmware::link::{ControlCell, ImageCell};
 use firmware::tasks::{self, Stopwatch};
@@ -24,6 +24,7 @@ use static_cell::StaticCell;
 
 use crate::http::LocalDesk;
 use crate::net::LocalService;
+use crate::watchdog;
 use crate::wires::Wires;
 
 /// What the tasks hand to each other.
@@ -46,10 +47,10 @@ pub fn start(
     start: Instant,
     machine: &'static Machine,
     wires: Wires,
+    started: Started,
 ) -> &'static Exchange {
     static EXCHANGE: StaticCell<Exchange> = StaticCell::new();
-    static LIFE: Life = Life::new();
-    let exchange = &*EXCHANGE.init(Exchange::new(&LIFE, Started::default()));
+    let exchange = &*EXCHANGE.init(Exchange::new(&watchdog::LIFE, started));
     plant_at.spawn(plant(start, machine, exchange).expect("first"));
     // after the plant, which the same alarm wakes
     plant_at.spawn(crate::wires::run(start, wires, exchange).expect("first"));
