@@ -70,6 +70,7 @@ pub(super) struct Snapshot {
     /// Its first drive cycle.
     pub cycle: u32,
     machine: Machine,
+    panel: Panel,
 }
 
 /// What is to be done once an order is.
@@ -163,6 +164,9 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
     }
 
     fn after(&mut self, cycle: u32, image: &mut Image) {
+        let now = Instant::now();
+        self.control
+            .lock(|control| control.borrow().report(now, &mut image.feedback));
         self.desk.with(|papers| {
             papers.cycle = cycle;
             // It has seen the rising edge, and a recording need not.
@@ -200,6 +204,7 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                     papers.snapshot = Some(Snapshot {
                         cycle,
                         machine: papers.setup.in_use.clone(),
+                        panel: papers.panel.clone(),
                     });
                     papers.recorder.begin(cycle, Beginning::Snapshot, commands);
                 }
@@ -210,7 +215,7 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                     if papers.setup.in_use != snapshot.machine {
                         papers.setup.is_in_use(snapshot.machine.clone());
                     }
-                    papers.panel = Panel::new(&papers.setup.in_use);
+                    papers.panel = snapshot.panel.clone();
                     match then {
                         Then::Replay => papers.recorder.play(cycle),
                         _ => papers.recorder.begin(cycle, Beginning::Snapshot, commands),
@@ -311,10 +316,12 @@ impl<M: RawMutex> Hmi<'_, M> {
         let now = Instant::now();
         self.visit(|image, control, papers| {
             if wanted {
+                let had_it = control.controller(now) == Controller::Panel;
                 control
                     .take_by_panel(now)
                     .map_err(|_| Refusal::new(409, format_args!("a PLC controls the winder")))?;
-                if !core::mem::take(&mut papers.leaving) {
+                papers.leaving = false;
+                if !had_it {
                     papers.panel = Panel::new(&papers.setup.in_use);
                 }
                 papers.audit(format_args!("the panel takes control"));

@@ -401,8 +401,13 @@ impl<M: RawMutex> Page<'_, M> {
                 break;
             }
             if let Some(signal) = of(usize::from(entry.word)) {
-                let counts = counts(signal, entry.value);
-                out.put(format_args!("{},{},{counts}\n", entry.after, signal.name))
+                let after = entry.after;
+                let counts = entry.value.map(|value| counts(signal, value));
+                let counts = fmt::from_fn(|f| match counts {
+                    Some(counts) => write!(f, "{counts}"),
+                    None => f.write_str("up"),
+                });
+                out.put(format_args!("{after},{},{counts}\n", signal.name))
                     .await?;
             }
         }

@@ -9,15 +9,18 @@ use model_core::image::{self, Commands, Image};
 const ENTRIES: usize = 8192;
 
 /// A word of the command block, and from which cycle after the beginning on it counts.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
     /// Drive cycles since the beginning.
     pub after: u32,
     /// The word.
     pub word: u16,
-    /// Its value.
-    pub value: u16,
+    /// Its value; none counts it up in every cycle until its next entry, as the panel's heartbeat does.
+    pub value: Option<u16>,
 }
+
+/// The word that may count up by itself.
+const BEAT: u16 = image::HEARTBEAT_PLC.word;
 
 /// What a recording begins with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +61,10 @@ pub struct Recorder {
     entries: Vec<Entry, ENTRIES>,
     begun: u32,
     known: Commands,
+    /// The heartbeat counts up by itself ...
+    counting: bool,
+    /// ... or has done so in the last cycle.
+    beaten: bool,
     end: Mark,
     full: bool,
     /// The next entry to be played.
@@ -73,6 +80,8 @@ impl Recorder {
             entries: Vec::new(),
             begun: 0,
             known: first,
+            counting: false,
+            beaten: false,
             end: Mark::default(),
             full: false,
             playing: None,
@@ -83,6 +92,7 @@ impl Recorder {
     pub fn begin(&mut self, cycle: u32, beginning: Beginning, first: Commands) {
         (self.beginning, self.begun) = (beginning, cycle);
         (self.first, self.known) = (first, first);
+        (self.counting, self.beaten) = (false, false);
         self.entries.clear();
         (self.end, self.full, self.playing) = (Mark::default(), false, None);
     }
@@ -90,6 +100,7 @@ impl Recorder {
     /// Plays the recording again from this drive cycle on, at which the simulator is as it was at its beginning.
     pub fn play(&mut self, cycle: u32) {
         (self.begun, self.known) = (cycle, self.first);
+        (self.counting, self.beaten) = (false, false);
         self.playing = Some(0);
     }
 
@@ -122,8 +133,17 @@ impl Recorder {
         while let Some(entry) = self.entries.get(*next)
             && entry.after <= after
         {
-            self.known.words[usize::from(entry.word)] = entry.value;
+            if entry.word == BEAT {
+                self.counting = entry.value.is_none();
+            }
+            if let Some(value) = entry.value {
+                self.known.words[usize::from(entry.word)] = value;
+            }
             *next += 1;
+        }
+        if self.counting {
+            let beat = &mut self.known.words[usize::from(BEAT)];
+            *beat = beat.wrapping_add(1);
         }
         *commands = self.known;
     }
@@ -152,12 +172,19 @@ impl Recorder {
         }
         let (known, commanded) = (self.known.words, image.commands.words);
         for (word, (old, new)) in (0..).zip(known.into_iter().zip(commanded)) {
-            let entry = Entry {
-                after,
-                word,
-                value: new,
-            };
-            if old != new && self.entries.push(entry).is_err() {
+            let mut value = Some(new);
+            let mut is_news = old != new;
+            if word == BEAT {
+                let beats = new == old.wrapping_add(1);
+                let (counts, counted) = (beats && self.beaten, self.counting);
+                (self.counting, self.beaten) = (counts, beats);
+                is_news = counts != counted || is_news && !counts;
+                if counts {
+                    value = None;
+                }
+            }
+            let entry = Entry { after, word, value };
+            if is_news && self.entries.push(entry).is_err() {
                 self.full = true;
                 // What was commanded in this cycle is not known as a whole.
                 self.entries.retain(|entry| entry.after != after);
@@ -166,5 +193,60 @@ impl Recorder {
         }
         (self.known, self.end) = (image.commands, now);
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_core::image::Feedback;
+    use model_core::machine::Machine;
+    use proptest::prelude::*;
+
+    fn image(commands: Commands) -> Image {
+        Image {
+            commands,
+            feedback: Feedback::default(),
+        }
+    }
+
+    proptest! {
+        /// Whatever was commanded is commanded again, cycle by cycle.
+        #[test]
+        fn a_replay_commands_what_was_recorded(
+            writes in prop::collection::vec((0..4_u16, prop_oneof![Just(None), (0..3_u16).prop_map(Some)]), 0..200)
+        ) {
+            let first = Commands::of(&Machine::news_8000());
+            let (mut recorder, mut commands) = (Recorder::new(first), first);
+            recorder.begin(7, Beginning::Snapshot, first);
+            let mut run = std::vec::Vec::new();
+            for (cycle, (word, value)) in (7..).zip(&writes) {
+                let word = &mut commands.words[usize::from(*word)];
+                *word = value.unwrap_or(word.wrapping_add(1));
+                prop_assert_eq!(recorder.after(cycle, &image(commands)), None);
+                run.push(commands);
+            }
+            recorder.play(1000);
+            for (cycle, expected) in (1000..).zip(&run) {
+                let mut played = Commands::default();
+                recorder.before(cycle, &mut played);
+                prop_assert_eq!(played, *expected);
+                let last = cycle + 1 == 1000 + run.len() as u32;
+                let replayed = recorder.after(cycle, &image(played));
+                prop_assert_eq!(replayed, last.then_some(Replayed::Same));
+            }
+        }
+    }
+
+    #[test]
+    fn a_heartbeat_of_every_cycle_takes_three_entries() {
+        let mut commands = Commands::default();
+        let mut recorder = Recorder::new(commands);
+        for cycle in 0..100_000 {
+            commands.set_word(&image::HEARTBEAT_PLC, cycle as u16);
+            recorder.after(cycle, &image(commands));
+        }
+        assert!(recorder.entry(1).is_some() && recorder.entry(3).is_none());
+        assert!(!recorder.is_full());
     }
 }
