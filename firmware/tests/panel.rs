@@ -116,7 +116,7 @@ fn sets_are_wound_to_their_diameter_one_after_the_other() {
         desk.does(Action::NewSet, State::Ready);
         assert!((desk.value(&image::D_WU) - 100.0).abs() < 1.0);
         // the parent roll stays
-        assert_eq!(desk.value(&image::D_UW), parent);
+        assert!((desk.value(&image::D_UW) - parent).abs() < 0.05);
         desk.does(Action::Thread, State::Threaded);
     }
     // its estimate has followed the larger set, and no preset has put it back

@@ -7,12 +7,13 @@
 //! holds what stands, and what it is follows from the winder's mode alone: it is right after a fault, too.
 
 use core::f32::consts::PI;
+use core::fmt;
 
 use heapless::Vec;
 use model_core::drive::DRIVE_PERIOD_MS;
 use model_core::exchange::TuneStep;
 use model_core::image::{self, Commands, Feedback, Signal};
-use model_core::logic::{Fault, Mode, Refusal, command, status};
+use model_core::logic::{Fault, LOOPS, Mode, Refusal, command, status};
 use model_core::machine::Machine;
 use model_core::profidrive::{stw1, zsw1};
 use model_core::real::Real;
@@ -73,6 +74,42 @@ pub enum Action {
     Autotune(u16),
     /// Drives off, at standstill: what comes before the panel is left.
     SwitchOff,
+}
+
+/// As an operator says it.
+impl fmt::Display for Action {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Prepare => "prepare",
+            Self::Thread => "thread",
+            Self::Run(_) => "run",
+            Self::Stop => "stop",
+            Self::EmergencyStop => "emergency stop",
+            Self::Acknowledge => "acknowledge",
+            Self::NewSet => "new set",
+            Self::Autotune(_) => "auto-tune",
+            Self::SwitchOff => "switch off",
+        })?;
+        match self {
+            Self::Run(Order { v_set_m_min, goal }) => {
+                if let Some(speed) = v_set_m_min {
+                    write!(f, " at {speed} m/min")?;
+                }
+                if let Some(length) = goal.length_m {
+                    write!(f, " to {length} m")?;
+                }
+                if let Some(diameter) = goal.diameter_mm {
+                    write!(f, " to {diameter} mm")?;
+                }
+                Ok(())
+            }
+            Self::Autotune(number) => match LOOPS.get(usize::from(*number)) {
+                Some(name) => write!(f, " of the {name}"),
+                None => Ok(()),
+            },
+            _ => Ok(()),
+        }
+    }
 }
 
 /// What to wind.
@@ -351,7 +388,7 @@ impl Panel {
         let web = is(feedback, status::WEB_THREADED);
         let ok = match action {
             Action::Prepare | Action::NewSet | Action::SwitchOff => at_rest,
-            Action::Autotune(loop_) => at_rest && usize::from(loop_) < LOOPS,
+            Action::Autotune(loop_) => at_rest && usize::from(loop_) < LOOPS.len(),
             Action::Thread => {
                 state == State::Ready || state == State::Threaded && mode(feedback) == Mode::Stall
             }
@@ -607,9 +644,6 @@ impl Panel {
         left.into_iter().any(|left_m| left_m <= stop_m)
     }
 }
-
-/// Loops that can be tuned.
-const LOOPS: usize = model_core::logic::LOOPS.len();
 
 fn is(feedback: &Feedback, bits: u16) -> bool {
     feedback.word(&image::WINDER_STATUS) & bits == bits

@@ -94,9 +94,12 @@ export async function attempt(method, path, body, done) {
 }
 
 /** A rejected value in words. */
-export function detail({ parameter, value, limit, unit, reason }) {
-  const at = limit === undefined || limit === null ? '' : `, limit ${limit}${unit ? ' ' + unit : ''}`;
-  return `${parameter} = ${value}: ${reason || 'not permitted'}${at}`;
+export function detail({ parameter, value, low, high, limit, unit, reason }) {
+  const of = unit ? ' ' + unit : '';
+  const known = (v) => v !== undefined && v !== null;
+  const limits =
+    known(low) && known(high) ? `, ${low} to ${high}${of} is permitted` : known(limit) ? `, limit ${limit}${of}` : '';
+  return `${parameter} = ${value}: ${reason || 'not permitted'}${limits}`;
 }
 
 /** Asks again what the simulator tells of itself. */

@@ -37,10 +37,12 @@ export default function Health() {
         <section class="card"><h2>Simulator</h2><dl class="facts"><div><dt>Version</dt><dd>${health.version}</dd></div>
           <div><dt>Board</dt><dd>${health.board}</dd></div><div><dt>Up for</dt><dd>${span(health.uptime_s)}</dd></div>
             <div><dt>Last reset</dt><dd>${health.reset_reason}</dd></div></dl></section>
-        <section class="card"><h2>Memory</h2><dl class="facts">
+        ${health.memory
+          ? html`<section class="card"><h2>Memory</h2><dl class="facts">
           ${Object.entries(health.memory ?? {}).map(([name, n]) => html`<div key=${name}><dt>
             ${sentence(name.replace(/_/g, ' ').replace(/\bram\b/, 'RAM'))}</dt><dd>
-              ${typeof n === 'number' ? bytes(n) : n === null ? '–' : String(n)}</dd></div>`)}</dl></section>
+              ${typeof n === 'number' ? bytes(n) : n === null ? '–' : String(n)}</dd></div>`)}</dl></section>`
+          : null}
       </div>
     </div>`;
 }

@@ -7,13 +7,11 @@ import { html, useState } from '../vendor/ui.js';
 import { signals, counts, figure } from '../live.js';
 import { Num, useGet, useLive } from '../parts.js';
 
-/** Upper ends of the poll intervals' classes, ms; the last has none. */
-const CLASSES = ['5', '10', '20', '50', '100', '200', '500', 'more'];
-
-function Histogram({ counts: list }) {
+/** Poll intervals: how many up to each edge, ms, and how many longer. */
+function Histogram({ counts: list, edges }) {
   const most = Math.max(...list, 1);
   if (!list.some(Boolean)) return html`<span class="quiet">–</span>`;
-  const text = list.map((n, i) => `${n} up to ${CLASSES[i] ?? 'more'} ms`).join(', ');
+  const text = list.map((n, i) => (i < edges.length ? `${n} up to ${edges[i]} ms` : `${n} longer`)).join(', ');
   return html`<span class="histogram" role="img" aria-label=${text} title=${text}>
     ${list.map((n, i) => html`<span key=${i} style=${{ height: n ? `${Math.max(8, (n / most) * 100)}%` : '2px' }} />`)}
       </span>`;
@@ -50,7 +48,8 @@ export default function Link() {
           </td><td>${c.protocol}</td><td>${c.controls ? html`<b>commands</b>` : '–'}</td><td class="n">
             ${figure(c.requests, 0)}</td><td class="n">${c.exceptions ? html`<b class="warned">▲ ${c.exceptions}
               </b>` : '0'}</td><td class="n">${age(c.idle_ms)}</td><td>
-                <${Histogram} counts=${c.poll_ms_histogram ?? []} /></td></tr>`)}
+                <${Histogram} counts=${c.poll_ms_histogram ?? []}
+            edges=${link.poll_edges_ms ?? []} /></td></tr>`)}
           ${link && !link.clients.length ? html`<tr><td colspan="7" class="quiet">Nobody is connected.</td>
             </tr>` : null}</tbody></table></div></section>
       <section class="card"><div class="head"><h2>Registers</h2>

@@ -6,7 +6,7 @@
 import { html, useState, useEffect, signal } from '../vendor/ui.js';
 import { info, attempt, get } from '../api.js';
 import { signals, counts, value, bit, figure, history, listeners, CYCLE_S } from '../live.js';
-import { Num, Bar, Lamp, Field, Switch, SECTIONS, useGet, useLive, span } from '../parts.js';
+import { Num, Bar, Lamp, Field, Switch, SECTIONS, useGet, useLive, sentence, span } from '../parts.js';
 import { Mimic, geometry } from '../mimic.js';
 
 /** The machine's parameters by name; of which revision. */
@@ -256,11 +256,11 @@ function Panel({ of }) {
               </button></li>`;
       })}
     </ol>
-    ${done !== null && at >= 2 ? html`<p class="goal">
+    ${done !== null && at === 2 ? html`<p class="goal">
       <progress max="1" value=${Math.min(1, done || 0)} aria-label="The set" /><span>
         ${figure(100 * Math.min(1, done || 0), 0)} % of ${target.diameter_mm ? `${figure(target.diameter_mm, 0)} mm` : `${figure(target.length_m, 0)} m`}${left(of, target, done)}</span></p>` : null}
     <${More} mine=${mine} />
-    <p class="message" aria-live="polite">${panel?.message || ''}</p>
+    <p class="message" aria-live="polite">${sentence(panel?.message || '')}</p>
     <div class="row spread">
       <button type="button" disabled=${!mine || !standing} onClick=${() => act('new_set')}>New set</button>
       <button type="button" class="stop" disabled=${!mine}

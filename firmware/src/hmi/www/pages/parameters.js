@@ -41,7 +41,7 @@ function title(part) {
 }
 
 /** A number with as many digits as it has. */
-const plain = (v) => (typeof v === 'number' ? String(Number(v.toPrecision(12))) : String(v));
+const plain = (v) => (v === null || v === undefined ? '–' : typeof v === 'number' ? String(Number(v.toPrecision(12))) : String(v));
 /** The same for reading: thin spaces every three digits of a long number. */
 const spaced = (v) =>
   plain(v)
@@ -51,57 +51,66 @@ const same = (a, b) => a === b || (typeof a === 'number' && Math.abs(a - b) <= 1
 
 /** Why a value cannot be, or nothing. */
 function wrong(p, entry) {
-  if (p.kind !== 'number') return '';
+  if (p.kind === 'switch' || p.kind === 'choice') return '';
   const n = Number(entry);
   if (String(entry).trim() === '' || !Number.isFinite(n)) return `${entry || 'nothing'} is not a number`;
   const unit = p.unit ? ' ' + p.unit : '';
-  if (n < p.low) return `${entry}${unit} is below the lowest, ${plain(p.low)}${unit}`;
-  if (n > p.high) return `${entry}${unit} is above the highest, ${plain(p.high)}${unit}`;
+  if (p.low !== null && n < p.low) return `${entry}${unit} is below the lowest, ${plain(p.low)}${unit}`;
+  if (p.high !== null && n > p.high) return `${entry}${unit} is above the highest, ${plain(p.high)}${unit}`;
   return '';
 }
 
-/** A machine file, as `cargo winder machine` writes and reads it: the preset, and what differs. */
+/** A value as a machine file has it. */
+const toml = (v) => (typeof v === 'string' ? JSON.stringify(v) : plain(v));
+
+/** A machine file, as `cargo winder machine` writes and reads it: the preset, and what differs. A list is whole. */
 function file(machine, parts) {
-  let out = `preset = "${machine}"\n`;
-  for (const { parameters } of parts) {
-    const own = parameters.filter((p) => !same(p.staged ?? p.value, p.default));
-    for (const p of own)
-      out += `${p.name} = ${typeof p.value === 'string' ? JSON.stringify(p.staged ?? p.value) : plain(p.staged ?? p.value)}\n`;
+  const all = parts.flatMap((part) => part.parameters).map((p) => ({ ...p, now: p.staged ?? p.value }));
+  const differs = (p) => !same(p.now, p.default);
+  const list = (name) => name.match(/^(.+)\[\d+\]\.|^(.+) \(/)?.slice(1).find(Boolean);
+  const changed = new Set(all.filter(differs).map((p) => list(p.name)));
+  const tables = new Map([['', '']]);
+  for (const p of all) {
+    const of = list(p.name);
+    if (p.name.includes(' (') || p.now === null || !(of ? changed.has(of) : differs(p))) continue;
+    const at = p.name.lastIndexOf('.');
+    const table = p.name.slice(0, Math.max(0, at));
+    const head = of ? `\n[[${of}]]\n` : `\n[${table}]\n`;
+    tables.set(table, (tables.get(table) ?? head) + `${p.name.slice(at + 1)} = ${toml(p.now)}\n`);
   }
-  return out;
+  return `preset = "${machine}"\n` + [...tables.values()].join('');
 }
 
-/** The values of a machine file; its lines are `name = value`, under `[part]` or with the whole name. */
+/** The values of a machine file, by name; the length of a list stands before its elements. */
 export function values(text, known) {
   const found = {};
+  const lengths = {};
   let preset = null;
   let table = '';
   text.split(/\r?\n/).forEach((line, i) => {
     const bare = line.replace(/#.*$/, '').trim();
     if (!bare) return;
-    const head = bare.match(/^\[([^\]]*(?:\[\d+\])?)\]$/);
-    if (head) {
-      table = head[1] ? head[1] + '.' : '';
+    const [, list, part] = bare.match(/^\[\[\s*([\w.]+)\s*\]\]$|^\[\s*([\w.]+)\s*\]$/) ?? [];
+    if (list) {
+      const length = [...known.keys()].find((name) => name.startsWith(list + ' ('));
+      if (!length) throw new Error(`Line ${i + 1}: a machine has no list ${list}`);
+      lengths[length] = (lengths[length] ?? 0) + 1;
+      table = `${list}[${lengths[length] - 1}].`;
       return;
     }
-    const pair = bare.match(/^"?([^"=]+?)"?\s*=\s*(.+)$/);
+    if (part) return void (table = part + '.');
+    const pair = bare.match(/^([\w.]+)\s*=\s*(.+)$/);
     if (!pair) throw new Error(`Line ${i + 1}: “${bare}” is not name = value`);
     const [, key, content] = pair;
     if (key === 'preset' && !table) return void (preset = content.replace(/"/g, ''));
     const name = table + key;
-    if (!known.has(name)) throw new Error(`Line ${i + 1}: this machine has no parameter ${name}`);
-    const value =
-      content === 'true'
-        ? true
-        : content === 'false'
-          ? false
-          : /^".*"$/.test(content)
-            ? content.slice(1, -1)
-            : Number(content.replace(/_/g, ''));
+    if (!known.has(name) && !table.includes('[')) throw new Error(`Line ${i + 1}: a machine has no parameter ${name}`);
+    const number = Number(content.replace(/_/g, ''));
+    const value = content === 'true' ? true : content === 'false' ? false : number;
     if (Number.isNaN(value)) throw new Error(`Line ${i + 1}: ${content} is not a value`);
     found[name] = value;
   });
-  return { preset, found };
+  return { preset, found: { ...lengths, ...found } };
 }
 
 function Row({ p, error, locked, onstage }) {
@@ -138,7 +147,7 @@ function Row({ p, error, locked, onstage }) {
                   ${unit}</i>`
       }
     </div>
-    <div class="range">${p.kind === 'number' ? html`<span>${spaced(p.low)} … ${spaced(p.high)}</span>` : html`<span />`}
+    <div class="range">${p.kind !== 'switch' && p.kind !== 'choice' ? html`<span>${spaced(p.low)} … ${spaced(p.high)}</span>` : html`<span />`}
       <span>default ${p.kind === 'switch' ? (p.default ? 'on' : 'off') : spaced(p.default)}</span></div>
     <div class="change">${changed ? html`<span>was ${spaced(p.value)}</span>` : ''}
       ${!same(now, p.default) ? html`<button type="button" class="plain" disabled=${locked}
@@ -160,9 +169,12 @@ export default function Parameters() {
 
   const load = async () => {
     try {
-      set(await get('parameters'));
+      const fresh = await get('parameters');
+      set(fresh);
+      return fresh.revision;
     } catch (error) {
       note(error.message, true);
+      return null;
     }
   };
   useEffect(() => {
@@ -182,30 +194,32 @@ export default function Parameters() {
   const all = answer.parts.flatMap((part) => part.parameters);
   const known = new Map(all.map((p) => [p.name, p]));
   const changes = all.filter((p) => p.staged !== null && p.staged !== undefined && !same(p.staged, p.value));
-  const stale = (error) =>
-    error.status === 409
-      ? `Somebody else has applied a change in the meantime, so this one was not taken: ${error.message}`
-      : error.message;
+  /** Why a change of a revision was not taken; shows what is so now. */
+  const refused = async (error, of) => {
+    setErrors((old) => ({ ...old, ...Object.fromEntries(error.details.map((d) => [d.parameter, detail(d)])) }));
+    const overtaken = (await load()) !== of && error.status === 409;
+    const why = overtaken ? 'Somebody else has applied a change in the meantime, so this one was not taken: ' : '';
+    note(why + error.message, true);
+  };
   const stage = async (wanted) => {
     try {
       await write('PUT', 'parameters/staged', { revision: answer.revision, values: wanted });
       setErrors((old) => Object.fromEntries(Object.entries(old).filter(([name]) => !(name in wanted))));
+      await load();
     } catch (error) {
-      setErrors((old) => ({ ...old, ...Object.fromEntries(error.details.map((d) => [d.parameter, detail(d)])) }));
-      note(stale(error), true);
+      await refused(error, answer.revision);
     }
-    await load();
   };
-  const apply = async () => {
+  // what is applied is what was reviewed, whatever has come since
+  const apply = async (reviewed) => {
     try {
-      const { revision: next } = await write('POST', 'parameters/apply', { revision: answer.revision });
-      note(`Applied: the machine is revision ${next ?? answer.revision + 1}`);
+      const { revision: next } = await write('POST', 'parameters/apply', { revision: reviewed });
+      note(`Applied: the machine is revision ${next ?? reviewed + 1}`);
       setOpen(null);
+      await load();
     } catch (error) {
-      setErrors(Object.fromEntries(error.details.map((d) => [d.parameter, detail(d)])));
-      note(stale(error), true);
+      await refused(error, reviewed);
     }
-    await load();
   };
   const preset = async (name) => {
     await attempt(
@@ -292,12 +306,12 @@ export default function Parameters() {
             </b> in the draft; the machine runs on with its old values.</span>
           <span class="row"><button type="button"
             onClick=${async () => (await attempt('DELETE', 'parameters/staged', { revision: answer.revision }, 'Draft discarded')) && (setErrors({}), load())}>Discard</button>
-          <button type="button" class="main" onClick=${() => setOpen('apply')}
+          <button type="button" class="main" onClick=${() => setOpen(answer.revision)}
             disabled=${answer.locked}>Review and apply</button></span></div>`
         : null
     }
     ${
-      open === 'apply'
+      typeof open === 'number'
         ? html`<${Dialog} title="Apply as one" onclose=${() => setOpen(null)}>
           <p>The winder is built anew with these values, at standstill: new core, full parent roll, no web.</p>
           <div class="scroll"><table><thead><tr><th>Parameter</th><th class="n">Now</th><th class="n">New</th>
@@ -306,7 +320,7 @@ export default function Parameters() {
               ${spaced(p.value)}</td><td class="n"><b>${spaced(p.staged)}</b></td><td>${p.unit}</td></tr>`)}</tbody>
                 </table></div>
           <div class="row end"><button type="button" onClick=${() => setOpen(null)}>Not yet</button>
-            <button type="button" class="main" onClick=${apply}>Apply</button></div><//>`
+            <button type="button" class="main" onClick=${() => apply(open)}>Apply</button></div><//>`
         : null
     }
     ${
