@@ -87,7 +87,9 @@ pub async fn background(exchange: &'static Exchange) {
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(exchange, image).expect("first"));
     spawner.spawn(crate::pace::pace().expect("first"));
-    crate::net::start(spawner, LocalService { image, control });
+    let service = LocalService { image, control };
+    crate::serial::start(spawner, service);
+    crate::net::start(spawner, service);
 }
 
 #[embassy_executor::task]
