@@ -13,7 +13,7 @@ type Stage = (&'static str, fn() -> Result<()>);
 
 /// Installs what is missing and runs every test there is.
 pub fn main() -> Result<ExitCode> {
-    let stages: [Stage; 6] = [
+    let stages: [Stage; 7] = [
         ("formatting", || cargo(&["fmt", "--all", "--check"])),
         ("lints", lints),
         ("host tests", || cargo(&["test"])),
@@ -35,11 +35,14 @@ pub fn main() -> Result<ExitCode> {
                 "--features",
                 "qemu",
                 "--test",
+                "peers",
+                "--test",
                 "qemu",
                 "--test",
                 "twin",
             ])
         }),
+        ("fuzzing the link", super::fuzz::check),
         ("timing and sizes", || {
             super::timing::check()?;
             super::size::check()
