@@ -27,6 +27,9 @@ const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// Lines of the log that an error shows.
 const LAST_WORDS: usize = 5;
 
+/// What the log says before the path of the serial line.
+pub const SERIAL: &str = "Modbus RTU, station 1, at ";
+
 /// A running QEMU; it ends when dropped.
 #[derive(Debug)]
 pub struct Qemu {
@@ -156,6 +159,8 @@ fn command(files: &Mps2, port: u16, http_port: u16, pace: f64) -> Command {
             "-serial",
             "chardev:log",
         ])
+        // the second UART: Modbus RTU at a pseudoterminal, whose name QEMU tells first
+        .args(["-chardev", "pty,id=rtu", "-serial", "chardev:rtu"])
         .arg("-nic")
         .arg(format!(
             "user,restrict=on,hostfwd=tcp:127.0.0.1:{port}-:502,hostfwd=tcp:127.0.0.1:{http_port}-:80"
@@ -195,6 +200,13 @@ fn keep(mut command: Command, started: &mpsc::Sender<Result<Child>>, table: &Tab
         let _ = orphan.kill();
         return;
     }
+    if let Some(text) = serial_line(&mut frames) {
+        log.push(Line {
+            level: Level::Info,
+            time: None,
+            text,
+        });
+    }
     let mut decoder = table.new_stream_decoder();
     let mut buffer = [0; 4096];
     while let Ok(n) = frames.read(&mut buffer)
@@ -219,6 +231,19 @@ fn keep(mut command: Command, started: &mpsc::Sender<Result<Child>>, table: &Tab
             }
         }
     }
+}
+
+/// Where the serial line is, of which QEMU tells before the firmware says anything.
+fn serial_line(out: &mut impl Read) -> Option<String> {
+    const LONGEST: usize = 200;
+    let mut told = Vec::new();
+    let mut byte = [0];
+    while told.len() < LONGEST && out.read(&mut byte).ok()? == 1 && byte != *b"\n" {
+        told.extend(byte);
+    }
+    let told = String::from_utf8(told).ok()?;
+    let path = told.split_whitespace().find(|word| word.starts_with('/'))?;
+    Some(format!("{SERIAL}{path}"))
 }
 
 fn line(frame: &Frame<'_>) -> Line {

@@ -1,10 +1,12 @@
-//! The signal list as CSV.
+//! The signal list: as CSV, as a block of IEC 61131-3 variables, as a page.
 //!
 //! Not here: the signals themselves. They stand in [`model_core::image::SIGNALS`], and this list cannot say
 //! anything else than the simulator does.
 
+use std::fmt::Write as _;
 use std::io::Write;
 
+use firmware::link::registers::FLOATS;
 use model_core::image::{Direction, Kind, SIGNALS, Signal};
 
 /// The columns.
@@ -62,6 +64,106 @@ pub fn write(out: impl Write) -> csv::Result<()> {
     Ok(())
 }
 
+/// First word of a PLC's own addresses for what it exchanges with a Modbus station; those of OpenPLC's first one.
+const PLC_WORD: u16 = 100;
+
+/// A block of global variables in the syntax of IEC 61131-3: `%QW` for what the PLC writes, `%IW` for what it reads.
+///
+/// A pair of words is two variables, since PLCs differ in the order of the words of a `UDINT`.
+pub fn iec() -> String {
+    let mut text = String::from(
+        "(* Modbus: %QW100 + n is holding register n, %IW100 + n is input register n; n counts from 0. *)\nVAR_GLOBAL\n",
+    );
+    for s in SIGNALS {
+        let area = match s.direction {
+            Direction::Command => 'Q',
+            Direction::Feedback => 'I',
+        };
+        let kind = match s.kind {
+            Kind::I16 => "INT",
+            Kind::Bits(_) => "WORD",
+            Kind::U16 | Kind::U32 | Kind::Code(_) => "UINT",
+        };
+        let halves: &[&str] = match s.kind {
+            Kind::U32 => &["_high", "_low"],
+            _ => &[""],
+        };
+        let scale = match s.unit {
+            "" => String::new(),
+            unit => format!(" [{} {unit}]", 1.0 / f64::from(s.counts)),
+        };
+        for (word, half) in (PLC_WORD + s.word..).zip(halves) {
+            let _ = writeln!(
+                text,
+                "    {}{half} AT %{area}W{word} : {kind}; (* {}{scale} *)",
+                s.name, s.description
+            );
+        }
+    }
+    text + "END_VAR\n"
+}
+
+/// The page `docs/signals.md`.
+pub fn page() -> String {
+    let mut text = String::from(
+        "# Signals\n\nWritten by `cargo winder signals --format markdown`. Registers, coils and discrete inputs count \
+         from 0, as they travel.\nA value is the word times its scale. The float of a signal stands at 1000 + 2 × its \
+         register and the next, high word\nfirst, in the unit, for commands as for feedback.\n",
+    );
+    for (direction, title) in [
+        (
+            Direction::Command,
+            "Commands: holding registers, read and written",
+        ),
+        (Direction::Feedback, "Feedback: input registers"),
+    ] {
+        let _ = write!(
+            text,
+            "\n## {title}\n\n| Register | Float | Name | Type | Scale | Unit | Limits | Meaning |\n|---|---|---|---|---|---|---|---|\n"
+        );
+        for s in SIGNALS.iter().filter(|s| s.direction == direction) {
+            let _ = writeln!(
+                text,
+                "| {} | {} | `{}` | {} | {} | {} | {} to {} | {} |",
+                s.word,
+                FLOATS + 2 * s.word,
+                s.name,
+                s.kind.name(),
+                1.0 / f64::from(s.counts),
+                s.unit,
+                s.limits.0,
+                s.limits.1,
+                description(s)
+            );
+        }
+        let (bits, title) = match direction {
+            Direction::Command => ("Coil", "Coils: single bits of the commands"),
+            Direction::Feedback => (
+                "Discrete input",
+                "Discrete inputs: single bits of the feedback",
+            ),
+        };
+        let _ = write!(
+            text,
+            "\n## {title}\n\n| {bits} | Name | 1 means |\n|---|---|---|\n"
+        );
+        for s in SIGNALS.iter().filter(|s| s.direction == direction) {
+            let Kind::Bits(named) = s.kind else { continue };
+            for bit in named {
+                let _ = writeln!(
+                    text,
+                    "| {} | `{}.{}` | {} |",
+                    BITS * s.word + u16::from(bit.number),
+                    s.name,
+                    bit.name,
+                    bit.description
+                );
+            }
+        }
+    }
+    text
+}
+
 fn description(signal: &Signal) -> String {
     let codes = match signal.kind {
         Kind::Code(codes) => codes,
@@ -115,6 +217,32 @@ mod tests {
             }
         }
         assert!(next.next().is_none());
+    }
+
+    #[test]
+    fn the_committed_page_is_that_of_the_signals() {
+        assert!(
+            page() == include_str!("../../docs/signals.md"),
+            "renew it: cargo winder signals --format markdown > docs/signals.md"
+        );
+    }
+
+    /// What an IEC 61131-3 compiler reads of a line: identifier, address, type.
+    #[test]
+    fn every_word_has_one_variable_of_the_plc() {
+        let text = iec();
+        let mut addresses = HashSet::new();
+        for line in text.lines().filter(|line| line.contains(" AT ")) {
+            let mut parts = line.split_whitespace();
+            let name = parts.next().unwrap();
+            assert!(name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'));
+            assert_eq!(parts.next(), Some("AT"));
+            assert!(addresses.insert(parts.next().unwrap().to_owned()), "{line}");
+            let (open, close) = (line.matches("(*").count(), line.matches("*)").count());
+            assert_eq!((open, close), (1, 1), "{line}");
+        }
+        let words = model_core::image::COMMAND_WORDS + model_core::image::FEEDBACK_WORDS;
+        assert_eq!(addresses.len(), words);
     }
 
     #[test]

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use host_tests::command::{
-    bench, conformance, demo, figures, flash, machine, replay, run, scenario, signals, size, test,
-    timing,
+    bench, conformance, demo, figures, flash, fuzz, machine, replay, run, scenario, signals, size,
+    test, timing,
 };
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
@@ -60,6 +60,10 @@ enum Command {
     ///
     /// The file is what `--machine` takes. One of your own names a preset and what differs from it.
     Machine(machine::Args),
+    /// Give arbitrary bytes to the link's codec, stream and serial line
+    ///
+    /// Exit status 1: an invariant did not hold; the input that broke it is named.
+    Fuzz(fuzz::Args),
     /// Look whether a Modbus TCP server does what the specification wants, case by case
     ///
     /// Without an address, the simulator's own. Exit status 1: a case failed.
@@ -96,6 +100,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         // the others start processes, which must end with this one
         Command::Demo(args) => interrupt::install().and_then(|()| demo::main(&args)),
         Command::Run(args) => interrupt::install().and_then(|()| run::main(args)),
+        Command::Fuzz(args) => interrupt::install().and_then(|()| fuzz::main(&args)),
         Command::Conformance(args) => interrupt::install().and_then(|()| conformance::main(&args)),
         Command::Bench(args) => interrupt::install().and_then(|()| bench::main(&args)),
         Command::Flash(args) => interrupt::install().and_then(|()| flash::main(&args)),

@@ -5,6 +5,7 @@ pub mod conformance;
 pub mod demo;
 pub mod figures;
 pub mod flash;
+pub mod fuzz;
 pub mod machine;
 pub mod replay;
 pub mod run;

@@ -13,7 +13,7 @@ type Stage = (&'static str, fn() -> Result<()>);
 
 /// Installs what is missing and runs every test there is.
 pub fn main() -> Result<ExitCode> {
-    let stages: [Stage; 6] = [
+    let stages: [Stage; 7] = [
         ("formatting", || cargo(&["fmt", "--all", "--check"])),
         ("lints", lints),
         ("host tests", || cargo(&["test"])),
@@ -36,6 +36,8 @@ pub fn main() -> Result<ExitCode> {
                 "--features",
                 "qemu",
                 "--test",
+                "peers",
+                "--test",
                 "qemu",
                 "--test",
                 "twin",
@@ -43,6 +45,7 @@ pub fn main() -> Result<ExitCode> {
                 "watchdog",
             ])
         }),
+        ("fuzzing the link", super::fuzz::check),
         ("timing and sizes", || {
             super::timing::check()?;
             super::size::check()

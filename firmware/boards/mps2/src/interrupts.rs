@@ -9,8 +9,8 @@
 //! - An alarm has the priority of the tasks that it wakes, which have to wait for each other
 //!   anyway. Both pending, the lower number goes first, so the plant's alarm delays the plant by
 //!   its own few instructions, and nothing else does.
-//! - The Ethernet has the background's priority. All it does is wake the network's task, which
-//!   runs there: it never disturbs a timed task, and it never meets the driver half-way.
+//! - The Ethernet and the serial line have the background's priority. All they do is wake their
+//!   tasks, which run there: they never disturb a timed task, and never meet a driver half-way.
 //!
 //! The steps are multiples of 0x10, so that they hold also where the core has four priority bits.
 
@@ -24,6 +24,8 @@ use cortex_m::peripheral::NVIC;
 #[derive(Clone, Copy)]
 #[repr(u16)]
 pub enum Interrupt {
+    /// UART1 has received.
+    Serial = 2,
     /// TIMER0: alarm of the plant.
     AlarmPlant = 8,
     /// TIMER1: alarm of the drive.
@@ -53,18 +55,21 @@ impl Interrupt {
         match self {
             Self::AlarmPlant | Self::Plant => 0x10,
             Self::AlarmDrive | Self::Drive => 0x20,
-            Self::AlarmBackground | Self::Ethernet | Self::Background => 0x30,
+            Self::AlarmBackground | Self::Serial | Self::Ethernet | Self::Background => 0x30,
         }
     }
 }
 
 /// Gives every interrupt its priority; enables none.
 pub fn set_priorities(nvic: &mut NVIC) {
-    use Interrupt::{AlarmBackground, AlarmDrive, AlarmPlant, Background, Drive, Ethernet, Plant};
+    use Interrupt::{
+        AlarmBackground, AlarmDrive, AlarmPlant, Background, Drive, Ethernet, Plant, Serial,
+    };
     for interrupt in [
         AlarmPlant,
         AlarmDrive,
         AlarmBackground,
+        Serial,
         Ethernet,
         Plant,
         Drive,
@@ -92,6 +97,7 @@ unsafe extern "C" {
 #[unsafe(no_mangle)]
 static __INTERRUPTS: [Vector; 32] = {
     let mut table: [Vector; 32] = [DefaultHandler; 32];
+    table[Interrupt::Serial as usize] = crate::serial::on_interrupt;
     table[Interrupt::AlarmPlant as usize] = crate::time_driver::on_alarm_plant;
     table[Interrupt::AlarmDrive as usize] = crate::time_driver::on_alarm_drive;
     table[Interrupt::AlarmBackground as usize] = crate::time_driver::on_alarm_background;

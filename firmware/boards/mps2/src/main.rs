@@ -18,6 +18,7 @@ mod lan9118;
 mod net;
 mod pace;
 mod register;
+mod serial;
 mod simulator;
 mod stopwatch;
 mod time_driver;

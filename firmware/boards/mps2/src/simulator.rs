@@ -98,6 +98,7 @@ pub async fn background(exchange: &'static Exchange, started: Started) {
     spawner.spawn(logic(exchange, service, desk).expect("first"));
     spawner.spawn(crate::pace::pace().expect("first"));
     spawner.spawn(watchdog::feed().expect("first"));
+    crate::serial::start(spawner, service);
     crate::net::start(spawner, service, desk);
 }
 
