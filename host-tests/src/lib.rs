@@ -4,6 +4,7 @@
 //! This library starts simulators, commands them as a winder PLC would, and shows what came of it. Its one
 //! program is the command line tool `winder`: a module of [`command`] for each subcommand.
 
+pub mod accept;
 pub mod batch;
 pub mod command;
 pub mod figures;
@@ -22,4 +23,5 @@ pub mod scenario;
 pub mod setup;
 pub mod signals;
 pub mod simulator;
+pub mod st;
 pub mod twin;
