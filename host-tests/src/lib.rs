@@ -11,6 +11,7 @@ pub mod figures;
 pub mod flops;
 pub mod handbook;
 pub mod interrupt;
+pub mod lesson;
 pub mod link;
 pub mod log;
 pub mod machine_file;

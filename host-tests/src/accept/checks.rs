@@ -133,6 +133,14 @@ impl Course {
         Ok(&self.samples[from.min(to)..to.min(self.samples.len())])
     }
 
+    /// The samples between two moments, the second of which the PLC must bring about.
+    fn reached(&self, from: &str, to: &str) -> Result<&[Sample], Miss> {
+        self.between(from, to).map_err(|miss| match (miss, self.mark(from)) {
+            (Miss::NotSeen(why), Ok(at)) => self.failed(why, self.samples.get(at)),
+            (miss, _) => miss,
+        })
+    }
+
     /// The samples from a moment on, for so long, s.
     fn after(&self, from: &str, s: f64) -> Result<&[Sample], Miss> {
         let rest = self.samples.get(self.mark(from)?..).unwrap_or_default();
@@ -371,7 +379,7 @@ fn start_sequence(c: &Course) -> Verdict {
 }
 
 fn preset_accept(c: &Course) -> Verdict {
-    let samples = c.between("new parent roll", "preset")?;
+    let samples = c.reached("new parent roll", "preset")?;
     let edges: Vec<_> = edges(samples, &WINDER_COMMAND, command::PRESET_ACCEPT).collect();
     match edges[..] {
         [] => Err(c.failed("no edge of preset_accept".into(), samples.first())),
@@ -629,13 +637,15 @@ fn sets(c: &Course) -> Verdict {
 }
 
 fn new_core(c: &Course) -> Verdict {
+    /// What thread winds up until the set begins, m, at most.
+    const THREADED: f64 = 15.0;
     let samples = c.between("core of the first set", "first set")?;
     let Some((_, at)) = edges(samples, &WINDER_COMMAND, command::NEW_CORE).next() else {
         return Err(c.failed("no edge of new_core".into(), samples.first()));
     };
     let last = samples.last().unwrap_or(at);
     let length = last.value(&image::PLC_LENGTH);
-    if length > 3.0 {
+    if length > THREADED {
         return Err(c.failed(
             format!("the PLC's length is {length:.2} m with a new core"),
             Some(last),
@@ -780,12 +790,7 @@ pub const CHECKS: &[Check] = &[
         trend: &[&image::STW1_UW, &image::ZSW1_UW, &WINDER_STATUS],
         causes: "a control word that is not 047F; an inhibited drive whose ON was not taken back",
         judge: |c| {
-            c.between("drives on", "in operation")
-                .map(|s| format!("after {:.2} s", span(s)))
-                .map_err(|miss| match (miss, c.mark("drives on")) {
-                    (Miss::NotSeen(why), Ok(at)) => c.failed(why, c.samples.get(at)),
-                    (miss, _) => miss,
-                })
+            c.reached("drives on", "in operation").map(|s| format!("after {:.2} s", span(s)))
         },
     },
     Check {
@@ -909,12 +914,7 @@ pub const CHECKS: &[Check] = &[
         trend: PULL,
         causes: "thread is not passed on; a wrong preset; stall tension too low",
         judge: |c| {
-            c.between("thread", "tight")
-                .map(|s| format!("after {:.1} s", span(s)))
-                .map_err(|miss| match (miss, c.mark("thread")) {
-                    (Miss::NotSeen(why), Ok(at)) => c.failed(why, c.samples.get(at)),
-                    (miss, _) => miss,
-                })
+            c.reached("thread", "tight").map(|s| format!("after {:.1} s", span(s)))
         },
     },
     Check {
@@ -1497,3 +1497,13 @@ pub const CHECKS: &[Check] = &[
         },
     },
 ];
+
+/// The checks as a table of Markdown, for the page about them.
+pub fn markdown() -> String {
+    let mut text = String::from("| Id | Area | Requirement | Likely causes |\n| --- | --- | --- | --- |\n");
+    for check in CHECKS {
+        let (id, area) = (check.id, check.area.name());
+        text += &format!("| {id} | {area} | {} | {} |\n", check.requirement, check.causes);
+    }
+    text
+}

@@ -238,14 +238,15 @@ fn parent_roll_end(run: &mut Run) -> Done {
     let wound = wind_down(run);
     run.ask(&image::OPERATOR_PARENT_END, 0.0);
     run.recover()?;
-    change_parent_roll(run, PARENTS[0])?;
-    wound
+    let changed = change_parent_roll(run, PARENTS[0]);
+    run.stand(0);
+    changed.and(wound)
 }
 
 fn wind_down(run: &mut Run) -> Done {
     run.tighten()?;
     run.mark("last layers");
-    run.excuse(alarm::PARENT_ROLL_END);
+    run.stand(alarm::PARENT_ROLL_END);
     run.speed_up(SPEEDS[0])?;
     run.until("mode != run", 60.0)?;
     run.until("winder_status.zero_speed", 40.0)?;

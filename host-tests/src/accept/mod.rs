@@ -7,6 +7,7 @@
 pub mod checks;
 pub mod controller;
 pub mod course;
+pub mod matrix;
 pub mod report;
 pub mod run;
 pub mod seeds;

@@ -117,6 +117,8 @@ pub struct Run<'a> {
     world: &'a mut dyn World,
     own: Commands,
     reasons: u16,
+    /// Those that an acknowledge does not take away.
+    standing: u16,
     course: Course,
     beat: Option<(u16, u64)>,
 }
@@ -127,6 +129,7 @@ pub fn run(world: &mut dyn World) -> Course {
         world,
         own: Commands::of(&Machine::news_8000()),
         reasons: 0,
+        standing: 0,
         course: Course::default(),
         beat: None,
     };
@@ -258,6 +261,12 @@ impl Run<'_> {
         self.reasons |= reasons;
     }
 
+    /// Alarms have these reasons until others are said to stand, whatever is acknowledged.
+    pub fn stand(&mut self, reasons: u16) {
+        self.standing = reasons;
+        self.reasons |= reasons;
+    }
+
     /// Remembers a moment.
     pub fn mark(&mut self, name: &'static str) {
         self.course.marks.push((name, self.course.samples.len()));
@@ -287,7 +296,9 @@ impl Run<'_> {
         self.wait(0.5)?;
         self.press(request::ACKNOWLEDGE)?;
         self.until("fault = 0", 3.0)?;
-        self.reasons = 0;
+        // the PLC sees that it has gone, and its alarms go
+        self.wait(0.5)?;
+        self.reasons = self.standing;
         self.press(request::DRIVES_OFF)?;
         self.until("mode = 0", 5.0)?;
         self.wait(0.2)

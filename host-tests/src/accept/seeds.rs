@@ -51,9 +51,9 @@ pub const SEEDS: &[Seed] = &[
         replace: "    IF plc_sets = 0 THEN d_preset_uw := parent.preset; END_IF;",
     },
     Seed {
-        name: "preset-every-time",
+        name: "preset-with-its-roll",
         area: Area::Preset,
-        what: "the edge that takes the preset over comes with its value, not behind it",
+        what: "the preset is taken over together with the new roll, which drops it",
         search: "accept := busy AND time.ET >= T#500ms AND time.ET < T#700ms;",
         replace: "accept := busy AND time.ET < T#200ms;",
     },
@@ -130,16 +130,9 @@ pub const SEEDS: &[Seed] = &[
     Seed {
         name: "tension-detection",
         area: Area::Thread,
-        what: "tension is not waited for",
-        search: "            ELSIF tight THEN
-                state := TIGHT;
-            END_IF;
-        TIGHT:",
-        replace: "            ELSE
-                tight := TRUE;
-                state := TIGHT;
-            END_IF;
-        TIGHT:",
+        what: "a web that is led through is taken for a tight one",
+        search: "tight := has(winder_status, 16#0002);",
+        replace: "tight := has(winder_status, 16#0004);",
     },
     Seed {
         name: "web-interlock",
@@ -204,9 +197,9 @@ pub const SEEDS: &[Seed] = &[
     Seed {
         name: "pulses-wrap",
         area: Area::Set,
-        what: "the length forgets what is counted over the encoder's wrap",
+        what: "pulses are subtracted as REAL, which neither wraps nor holds them",
         search: "    counted := counted + UDINT_TO_DINT(pulses - last);",
-        replace: "    IF pulses > last THEN counted := UDINT_TO_DINT(pulses / 2); END_IF;",
+        replace: "    counted := counted + REAL_TO_DINT(UDINT_TO_REAL(pulses) - UDINT_TO_REAL(last));",
     },
     Seed {
         name: "wrong-reset",

@@ -1,8 +1,10 @@
 //! The subcommands of `winder`, a module each.
 
+pub mod accept;
 pub mod bench;
 pub mod demo;
 pub mod figures;
+pub mod lesson;
 pub mod machine;
 pub mod replay;
 pub mod run;
