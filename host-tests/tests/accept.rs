@@ -2,11 +2,12 @@
 #![allow(clippy::unwrap_used)]
 
 use host_tests::accept::checks::{Miss, markdown};
-use host_tests::accept::controller::{Controller, DemoPlc, Garbage, REFERENCE, Silent, StPlc, Stopping};
+use host_tests::accept::controller::{
+    Controller, DemoPlc, Garbage, REFERENCE, Silent, StPlc, Stopping,
+};
 use host_tests::accept::matrix::{golden, rows, table};
-use host_tests::accept::run::LIMIT_S;
 use host_tests::accept::seeds::SEEDS;
-use host_tests::accept::world::Lockstep;
+use host_tests::accept::world::{LIMIT_S, Lockstep};
 use host_tests::accept::{Outcome, accept};
 use host_tests::lesson::{Play, shipped};
 use host_tests::plc::{Plc, Recipe};
@@ -24,13 +25,26 @@ fn found(outcome: &Outcome) -> Vec<&'static str> {
 #[test]
 fn every_seeded_error_is_found_in_its_area() {
     let rows = rows().unwrap();
-    assert!(rows[0].marks.chars().all(|mark| mark == '.'), "{}", table(&rows[..1]));
+    assert!(
+        rows[0].marks.chars().all(|mark| mark == '.'),
+        "{}",
+        table(&rows[..1])
+    );
     for row in &rows[1..] {
         let area = row.area.unwrap();
-        assert!(row.found.contains(&area), "{}: {:?}, not {area:?}", row.name, row.found);
+        assert!(
+            row.found.contains(&area),
+            "{}: {:?}, not {area:?}",
+            row.name,
+            row.found
+        );
     }
     let kept = std::fs::read_to_string(golden()).unwrap();
-    assert_eq!(kept, table(&rows), "renew it: cargo winder accept --matrix --bless");
+    assert_eq!(
+        kept,
+        table(&rows),
+        "renew it: cargo winder accept --matrix --bless"
+    );
 }
 
 #[test]
@@ -39,7 +53,12 @@ fn an_error_that_does_not_fit_the_program_is_refused() {
         let program = seed.sow(REFERENCE).unwrap();
         assert_ne!(program, REFERENCE);
         let twice = format!("{REFERENCE}{}", seed.search);
-        assert!(seed.sow(&twice).unwrap_err().to_string().contains("2 times"));
+        assert!(
+            seed.sow(&twice)
+                .unwrap_err()
+                .to_string()
+                .contains("2 times")
+        );
     }
 }
 
@@ -47,7 +66,14 @@ fn an_error_that_does_not_fit_the_program_is_refused() {
 fn a_silent_plc_is_found_out() {
     let outcome = run(Silent);
     assert!(found(&outcome).contains(&"L01"));
-    assert!(outcome.course.ended.as_ref().unwrap().contains("heartbeat has stood"));
+    assert!(
+        outcome
+            .course
+            .ended
+            .as_ref()
+            .unwrap()
+            .contains("heartbeat has stood")
+    );
     // the report is written all the same, and says so
     assert!(outcome.html("nothing").contains("heartbeat has stood"));
     assert!(outcome.junit("nothing").contains("skipped message"));
@@ -82,9 +108,20 @@ fn the_demo_s_plc_has_what_it_has() {
         speed_m_s: 5.0,
     };
     let outcome = run(DemoPlc::new(Plc::new(recipe)));
-    let id = |id: &str| &outcome.verdicts.iter().find(|(check, _)| check.id == id).unwrap().1;
+    let id = |id: &str| {
+        &outcome
+            .verdicts
+            .iter()
+            .find(|(check, _)| check.id == id)
+            .unwrap()
+            .1
+    };
     // it switches on without being asked, and does not hear the operator
-    assert!(matches!(id("S01"), Err(Miss::Failed(..))), "{:?}", id("S01"));
+    assert!(
+        matches!(id("S01"), Err(Miss::Failed(..))),
+        "{:?}",
+        id("S01")
+    );
     // what it writes is sound
     assert!(id("L07").is_ok(), "{:?}", id("L07"));
     assert!(!outcome.passed());
@@ -95,7 +132,9 @@ fn a_report_is_well_formed_whatever_it_says() {
     let outcome = run(Silent);
     let xml = outcome.junit("a \"name\" with <marks> & more");
     let document = resvg::usvg::roxmltree::Document::parse(&xml).unwrap();
-    let cases = document.descendants().filter(|node| node.has_tag_name("testcase"));
+    let cases = document
+        .descendants()
+        .filter(|node| node.has_tag_name("testcase"));
     assert_eq!(cases.count(), outcome.verdicts.len());
     let html = outcome.html("a \"name\" with <marks> & more");
     assert!(html.contains("a &quot;name&quot; with &lt;marks&gt; &amp; more"));
@@ -110,13 +149,21 @@ fn lessons_are_solved_by_their_solutions_and_not_by_waiting() {
         for act in &lesson.solution {
             play.act(act).unwrap();
         }
-        let told: Vec<_> = play.scores().map(|(s, earned)| (s.what.clone(), earned)).collect();
+        let told: Vec<_> = play
+            .scores()
+            .map(|(s, earned)| (s.what.clone(), earned))
+            .collect();
         assert_eq!(play.points(), 100, "{}: {told:?}", lesson.name);
         let mut idle = Play::new(&lesson).unwrap();
         while !idle.is_over() {
             idle.tick().unwrap();
         }
-        assert!(idle.points() < 60, "{}: {} points for nothing", lesson.name, idle.points());
+        assert!(
+            idle.points() < 60,
+            "{}: {} points for nothing",
+            lesson.name,
+            idle.points()
+        );
     }
 }
 

@@ -133,12 +133,19 @@ impl Course {
         Ok(&self.samples[from.min(to)..to.min(self.samples.len())])
     }
 
+    /// The same, with the sample before: what an edge rises from.
+    fn edges_between(&self, from: &str, to: &str) -> Result<&[Sample], Miss> {
+        let (from, to) = (self.mark(from)?.saturating_sub(1), self.mark(to)?);
+        Ok(&self.samples[from.min(to)..to.min(self.samples.len())])
+    }
+
     /// The samples between two moments, the second of which the PLC must bring about.
     fn reached(&self, from: &str, to: &str) -> Result<&[Sample], Miss> {
-        self.between(from, to).map_err(|miss| match (miss, self.mark(from)) {
-            (Miss::NotSeen(why), Ok(at)) => self.failed(why, self.samples.get(at)),
-            (miss, _) => miss,
-        })
+        self.between(from, to)
+            .map_err(|miss| match (miss, self.mark(from)) {
+                (Miss::NotSeen(why), Ok(at)) => self.failed(why, self.samples.get(at)),
+                (miss, _) => miss,
+            })
     }
 
     /// The samples from a moment on, for so long, s.
@@ -351,7 +358,7 @@ fn words(c: &Course) -> Verdict {
 
 /// 047E stands before 047F, in each drive.
 fn start_sequence(c: &Course) -> Verdict {
-    let samples = c.between("drives on", "in operation")?;
+    let samples = c.edges_between("drives on", "in operation")?;
     let mut told = Vec::new();
     for (stw, zsw) in STW1.into_iter().zip(ZSW1) {
         let first = samples.iter().position(|s| s.has(stw, stw1::ON));
@@ -379,7 +386,8 @@ fn start_sequence(c: &Course) -> Verdict {
 }
 
 fn preset_accept(c: &Course) -> Verdict {
-    let samples = c.reached("new parent roll", "preset")?;
+    c.reached("new parent roll", "preset")?;
+    let samples = c.edges_between("new parent roll", "preset")?;
     let edges: Vec<_> = edges(samples, &WINDER_COMMAND, command::PRESET_ACCEPT).collect();
     match edges[..] {
         [] => Err(c.failed("no edge of preset_accept".into(), samples.first())),
@@ -639,7 +647,7 @@ fn sets(c: &Course) -> Verdict {
 fn new_core(c: &Course) -> Verdict {
     /// What thread winds up until the set begins, m, at most.
     const THREADED: f64 = 15.0;
-    let samples = c.between("core of the first set", "first set")?;
+    let samples = c.edges_between("core of the first set", "first set")?;
     let Some((_, at)) = edges(samples, &WINDER_COMMAND, command::NEW_CORE).next() else {
         return Err(c.failed("no edge of new_core".into(), samples.first()));
     };
@@ -790,7 +798,8 @@ pub const CHECKS: &[Check] = &[
         trend: &[&image::STW1_UW, &image::ZSW1_UW, &WINDER_STATUS],
         causes: "a control word that is not 047F; an inhibited drive whose ON was not taken back",
         judge: |c| {
-            c.reached("drives on", "in operation").map(|s| format!("after {:.2} s", span(s)))
+            c.reached("drives on", "in operation")
+                .map(|s| format!("after {:.2} s", span(s)))
         },
     },
     Check {
@@ -914,7 +923,8 @@ pub const CHECKS: &[Check] = &[
         trend: PULL,
         causes: "thread is not passed on; a wrong preset; stall tension too low",
         judge: |c| {
-            c.reached("thread", "tight").map(|s| format!("after {:.1} s", span(s)))
+            c.reached("thread", "tight")
+                .map(|s| format!("after {:.1} s", span(s)))
         },
     },
     Check {
@@ -1500,10 +1510,14 @@ pub const CHECKS: &[Check] = &[
 
 /// The checks as a table of Markdown, for the page about them.
 pub fn markdown() -> String {
-    let mut text = String::from("| Id | Area | Requirement | Likely causes |\n| --- | --- | --- | --- |\n");
+    let mut text =
+        String::from("| Id | Area | Requirement | Likely causes |\n| --- | --- | --- | --- |\n");
     for check in CHECKS {
         let (id, area) = (check.id, check.area.name());
-        text += &format!("| {id} | {area} | {} | {} |\n", check.requirement, check.causes);
+        text += &format!(
+            "| {id} | {area} | {} | {} |\n",
+            check.requirement, check.causes
+        );
     }
     text
 }

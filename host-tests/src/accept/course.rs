@@ -56,9 +56,9 @@ pub const EPISODES: &[Row] = &[
 ];
 
 fn before_the_start(run: &mut Run) -> Done {
-    run.ask(&image::OPERATOR_V_SET, SPEEDS[0]);
-    run.ask(&image::OPERATOR_TENSION_SET, TENSION);
-    run.ask(&image::OPERATOR_PARENT, PARENTS[0]);
+    run.ask(&image::OPERATOR_V_SET, SPEEDS[0])?;
+    run.ask(&image::OPERATOR_TENSION_SET, TENSION)?;
+    run.ask(&image::OPERATOR_PARENT, PARENTS[0])?;
     run.excuse(u16::MAX);
     run.wait(2.0)?;
     // what an earlier run may have left behind
@@ -71,11 +71,11 @@ fn before_the_start(run: &mut Run) -> Done {
     run.press(request::RUN)?;
     run.wait(1.0)?;
     run.mark("asked without drives, over");
-    run.ask(&image::OPERATOR_V_SET, TOO_FAST);
+    run.ask(&image::OPERATOR_V_SET, TOO_FAST)?;
     run.wait(0.5)?;
     run.mark("too fast");
     run.wait(0.5)?;
-    run.ask(&image::OPERATOR_V_SET, SPEEDS[0]);
+    run.ask(&image::OPERATOR_V_SET, SPEEDS[0])?;
     run.wait(0.3)
 }
 
@@ -149,8 +149,8 @@ fn run(run: &mut Run) -> Done {
     run.press(request::NEW_PARENT_ROLL)?;
     run.wait(1.0)?;
     run.mark("other set-points");
-    run.ask(&image::OPERATOR_V_SET, SPEEDS[1]);
-    run.ask(&image::OPERATOR_TENSION_SET, TENSION + 50.0);
+    run.ask(&image::OPERATOR_V_SET, SPEEDS[1])?;
+    run.ask(&image::OPERATOR_TENSION_SET, TENSION + 50.0)?;
     run.wait(8.0)?;
     run.mark("followed");
     run.mark("stop");
@@ -158,7 +158,7 @@ fn run(run: &mut Run) -> Done {
     run.until("winder_status.zero_speed", 40.0)?;
     run.wait(2.0)?;
     run.mark("stopped");
-    run.ask(&image::OPERATOR_TENSION_SET, TENSION);
+    run.ask(&image::OPERATOR_TENSION_SET, TENSION)?;
     run.wait(0.3)
 }
 
@@ -168,7 +168,7 @@ fn wind(run: &mut Run, began: &'static str) -> Done {
     run.wait(0.5)?;
     run.tighten()?;
     run.mark(began);
-    run.ask(&image::OPERATOR_V_SET, SET_SPEED);
+    run.ask(&image::OPERATOR_V_SET, SET_SPEED)?;
     run.press(request::RUN)?;
     run.until("mode = run", 3.0)?;
     run.until("mode != run", 120.0)?;
@@ -180,7 +180,7 @@ fn set_to_length(run: &mut Run) -> Done {
     // 42 m before the counter wraps
     run.inject(&image::PULSES_AHEAD, u16::MAX, 0);
     run.wait(0.5)?;
-    run.ask(&image::OPERATOR_LENGTH_SET, LENGTH);
+    run.ask(&image::OPERATOR_LENGTH_SET, LENGTH)?;
     run.mark("core of the first set");
     wind(run, "first set")?;
     run.mark("first set stands");
@@ -194,22 +194,22 @@ fn set_to_length(run: &mut Run) -> Done {
 }
 
 fn set_to_diameter(run: &mut Run) -> Done {
-    run.ask(&image::OPERATOR_LENGTH_SET, 0.0);
+    run.ask(&image::OPERATOR_LENGTH_SET, 0.0)?;
     run.recover()?;
-    run.ask(&image::OPERATOR_DIAMETER_SET, DIAMETER);
-    run.ask(&image::OPERATOR_TAPER, 100.0 * TAPER);
-    run.ask(&image::OPERATOR_FORCE, FORCE);
-    run.ask(&image::OPERATOR_RIDER, RIDER);
+    run.ask(&image::OPERATOR_DIAMETER_SET, DIAMETER)?;
+    run.ask(&image::OPERATOR_TAPER, 100.0 * TAPER)?;
+    run.ask(&image::OPERATOR_FORCE, FORCE)?;
+    run.ask(&image::OPERATOR_RIDER, RIDER)?;
     let wound = wind(run, "second set");
     if wound.is_ok() {
         run.mark("second set stands");
         run.wait(3.0)?;
         run.mark("second set rests");
     }
-    run.ask(&image::OPERATOR_DIAMETER_SET, 0.0);
-    run.ask(&image::OPERATOR_TAPER, 0.0);
-    run.ask(&image::OPERATOR_FORCE, 0.0);
-    run.ask(&image::OPERATOR_RIDER, 0.0);
+    run.ask(&image::OPERATOR_DIAMETER_SET, 0.0)?;
+    run.ask(&image::OPERATOR_TAPER, 0.0)?;
+    run.ask(&image::OPERATOR_FORCE, 0.0)?;
+    run.ask(&image::OPERATOR_RIDER, 0.0)?;
     wound
 }
 
@@ -220,11 +220,9 @@ fn change_parent_roll(run: &mut Run, diameter: f64) -> Done {
     run.press(request::NEW_CORE)?;
     run.wait(0.3)?;
     let full = diameter >= PARENTS[0];
-    run.ask(
-        &image::PARENT_ROLL_PUT_IN,
-        if full { 0.0 } else { diameter },
-    );
-    run.ask(&image::OPERATOR_PARENT, diameter);
+    let counts = (diameter * f64::from(image::PARENT_ROLL_PUT_IN.counts)) as u16;
+    run.inject(&image::PARENT_ROLL_PUT_IN, if full { 0 } else { counts }, 0);
+    run.ask(&image::OPERATOR_PARENT, diameter)?;
     run.press(request::NEW_PARENT_ROLL)?;
     run.wait(1.5)?;
     run.until("winder_status.preset_taken", 5.0)
@@ -234,9 +232,9 @@ fn parent_roll_end(run: &mut Run) -> Done {
     run.recover()?;
     change_parent_roll(run, PARENTS[1])?;
     run.mark("nearly used up");
-    run.ask(&image::OPERATOR_PARENT_END, PARENTS[2]);
+    run.ask(&image::OPERATOR_PARENT_END, PARENTS[2])?;
     let wound = wind_down(run);
-    run.ask(&image::OPERATOR_PARENT_END, 0.0);
+    run.ask(&image::OPERATOR_PARENT_END, 0.0)?;
     run.recover()?;
     let changed = change_parent_roll(run, PARENTS[0]);
     run.stand(0);
@@ -352,10 +350,10 @@ fn load_cells(run: &mut Run) -> Done {
     let reasons = alarm::LOAD_CELL | alarm::WEB_BREAK;
     run.inject(&image::FAULT_SENSORS, 1 << 2, reasons);
     run.wait(1.0)?;
-    run.ask(&image::OPERATOR_TENSION_SET, TENSION + 100.0);
+    run.ask(&image::OPERATOR_TENSION_SET, TENSION + 100.0)?;
     let stopped = run.until("mode != run", 12.0);
     run.mark("load cells, over");
-    run.ask(&image::OPERATOR_TENSION_SET, TENSION);
+    run.ask(&image::OPERATOR_TENSION_SET, TENSION)?;
     run.wait(1.0)?;
     stopped
 }

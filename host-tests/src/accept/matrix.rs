@@ -20,8 +20,8 @@ use super::{Outcome, accept};
 /// A program's run.
 pub fn run(program: &str) -> Result<Outcome> {
     let machine = Machine::news_8000();
-    let mut world = Lockstep::new(&machine, StPlc::new(program)?)
-        .context("the machine cannot be simulated")?;
+    let mut world =
+        Lockstep::new(&machine, StPlc::new(program)?).context("the machine cannot be simulated")?;
     Ok(accept(&mut world))
 }
 
@@ -83,7 +83,11 @@ fn row(i: usize) -> Result<Row> {
     Ok(Row {
         name,
         area: seed.map(|seed| seed.area),
-        marks: outcome.verdicts.iter().map(|(_, verdict)| mark(verdict)).collect(),
+        marks: outcome
+            .verdicts
+            .iter()
+            .map(|(_, verdict)| mark(verdict))
+            .collect(),
         found,
     })
 }
@@ -98,7 +102,11 @@ pub fn table(rows: &[Row]) -> String {
         let _ = writeln!(text, "{:44}{}", "", ids.collect::<String>());
     }
     for row in rows {
-        let name = if row.name.is_empty() { "(none)" } else { row.name };
+        let name = if row.name.is_empty() {
+            "(none)"
+        } else {
+            row.name
+        };
         let area = row.area.map_or("", Area::name);
         let _ = writeln!(text, "{name:24}{area:20}{}", row.marks);
     }

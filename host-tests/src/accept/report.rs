@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use model_core::image::{Kind, Signal};
+use model_core::image::{Kind, SIGNALS, Signal};
 
 use super::Outcome;
 use super::checks::{Check, Miss, Verdict};
@@ -180,6 +180,21 @@ impl Outcome {
             page += "</details>\n";
         }
         page + "</html>\n"
+    }
+
+    /// All that was seen, as CSV: a row for each look, a column for each signal, in its unit.
+    pub fn csv(&self) -> String {
+        let mut text = String::from("t_s");
+        for signal in SIGNALS {
+            let _ = write!(text, ",{}", signal.name);
+        }
+        for s in &self.course.samples {
+            let _ = write!(text, "\n{:.2}", s.t_s());
+            for signal in SIGNALS {
+                let _ = write!(text, ",{}", s.value(signal));
+            }
+        }
+        text + "\n"
     }
 
     /// The report as JUnit XML.

@@ -4,7 +4,7 @@
 //! episode, and the checks ([`super::checks`]) judge the trace afterwards.
 
 use anyhow::Error;
-use model_core::desk::request;
+use model_core::desk::{REQUEST_BITS, request};
 use model_core::image::{self, Commands, Image, Kind, Signal};
 use model_core::machine::Machine;
 
@@ -17,8 +17,6 @@ use crate::scenario::{CYCLES_PER_S, seconds};
 const PRESS_S: f64 = 0.3;
 /// Without a heartbeat for this long the PLC is gone, s.
 const DEAD_S: f64 = 10.0;
-/// A course may take so long, s of the simulator's time.
-pub const LIMIT_S: f64 = 900.0;
 
 /// What was seen at a time, and which alarms have a reason.
 #[derive(Clone, Copy, Debug)]
@@ -182,8 +180,9 @@ impl Run<'_> {
             }
             _ => self.beat = Some((beat, cycle)),
         }
-        if seconds(cycle) > LIMIT_S {
-            return Err(Stuck::Over(format!("the course has taken {LIMIT_S} s")));
+        let limit_s = self.world.limit_s();
+        if seconds(cycle) > limit_s {
+            return Err(Stuck::Over(format!("the course has taken {limit_s} s")));
         }
         Ok(())
     }
@@ -219,35 +218,38 @@ impl Run<'_> {
 
     /// Presses a push-button of the desk.
     pub fn press(&mut self, button: u16) -> Done {
-        let name = model_core::desk::REQUEST_BITS
-            .iter()
-            .find(|bit| button >> bit.number & 1 == 1)
-            .map_or("", |bit| bit.name);
-        self.world.prompt(&format!("press {name}"));
-        self.hold(button)?;
+        self.world.prompt(&format!("press {}", name(button)))?;
+        self.put(button, true)?;
         self.wait(PRESS_S)?;
-        self.release(button)
+        self.put(button, false)
     }
 
     /// Holds a push-button down.
     pub fn hold(&mut self, button: u16) -> Done {
-        let word = self.own.word(&image::OPERATOR_REQUEST) | button;
-        self.own.set_word(&image::OPERATOR_REQUEST, word);
-        self.tick()
+        self.world.prompt(&format!("hold {} down", name(button)))?;
+        self.put(button, true)
     }
 
     /// Lets a push-button go.
     pub fn release(&mut self, button: u16) -> Done {
+        self.world.prompt(&format!("let {} go", name(button)))?;
+        self.put(button, false)
+    }
+
+    fn put(&mut self, button: u16, down: bool) -> Done {
         let word = self.own.word(&image::OPERATOR_REQUEST) & !button;
-        self.own.set_word(&image::OPERATOR_REQUEST, word);
+        let button = if down { button } else { 0 };
+        self.own.set_word(&image::OPERATOR_REQUEST, word | button);
         self.tick()
     }
 
     /// Sets a value of the desk, in its unit.
-    pub fn ask(&mut self, signal: &Signal, value: f64) {
+    pub fn ask(&mut self, signal: &Signal, value: f64) -> Done {
         let (name, unit) = (signal.name, signal.unit);
-        self.world.prompt(&format!("set {name} to {value} {unit}"));
+        self.world
+            .prompt(&format!("set {name} to {value} {unit}"))?;
         self.own.set(signal, value);
+        Ok(())
     }
 
     /// Puts in a fault, by its word, and with the alarms for which it is a reason.
@@ -272,10 +274,10 @@ impl Run<'_> {
         self.course.marks.push((name, self.course.samples.len()));
     }
 
-    /// Takes everything back that was put in, and the push-buttons.
+    /// Takes everything back that was put in, and the desk.
     fn leave(&mut self) {
-        self.sound();
-        self.own.set_word(&image::OPERATOR_REQUEST, 0);
+        self.own = Commands::of(&Machine::news_8000());
+        // what cannot be reached any more has told so already
         let _ = self.tick();
     }
 
@@ -324,8 +326,14 @@ impl Run<'_> {
 
     /// From a tight web to a speed, m/min.
     pub fn speed_up(&mut self, v_m_min: f64) -> Done {
-        self.ask(&image::OPERATOR_V_SET, v_m_min);
+        self.ask(&image::OPERATOR_V_SET, v_m_min)?;
         self.press(request::RUN)?;
         self.until("winder_status.at_speed and mode = run", 60.0)
     }
+}
+
+/// A push-button's name.
+fn name(button: u16) -> &'static str {
+    let is = |bit: &&image::Bit| button >> bit.number & 1 == 1;
+    REQUEST_BITS.iter().find(is).map_or("", |bit| bit.name)
 }

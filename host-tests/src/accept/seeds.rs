@@ -82,7 +82,7 @@ pub const SEEDS: &[Seed] = &[
         name: "run-edge",
         area: Area::Run,
         what: "run is an edge where the drives want a level",
-        search: "OR bit(state = RUNNING, 16#0004)",
+        search: "OR bit(state = S_RUNNING, 16#0004)",
         replace: "OR bit(b_run.Q, 16#0004)",
     },
     Seed {
@@ -97,20 +97,20 @@ pub const SEEDS: &[Seed] = &[
         area: Area::Run,
         what: "the stop switches the drives off",
         search: "            ELSIF b_stop.Q THEN
-                state := STOPPING;
+                state := S_STOPPING;
             END_IF;
-        STOPPING:",
+        S_STOPPING:",
         replace: "            ELSIF b_stop.Q THEN
                 switched_on := FALSE;
-                state := STOPPING;
+                state := S_STOPPING;
             END_IF;
-        STOPPING:",
+        S_STOPPING:",
     },
     Seed {
         name: "core-interlock",
         area: Area::Run,
         what: "a new core is passed on while the web runs",
-        search: "core_pulse(IN := b_core.Q AND standstill AND (state = OFF OR state = READY), PT",
+        search: "core_pulse(IN := b_core.Q AND standstill AND (state = S_OFF OR state = S_READY), PT",
         replace: "core_pulse(IN := b_core.Q, PT",
     },
     Seed {
@@ -220,22 +220,22 @@ pub const SEEDS: &[Seed] = &[
         area: Area::Set,
         what: "the end of a set is not remembered: thread is free again",
         search: "                    core_in := FALSE;
-                    state := WOUND;",
-        replace: "                    state := READY;",
+                    state := S_WOUND;",
+        replace: "                    state := S_READY;",
     },
     Seed {
         name: "brake-timing",
         area: Area::Set,
         what: "the drum brakes are closed when the stop begins",
-        search: "rest(IN := state = WOUND, PT",
-        replace: "rest(IN := state = STOPPING OR state = WOUND, PT",
+        search: "rest(IN := state = S_WOUND, PT",
+        replace: "rest(IN := state = S_STOPPING OR state = S_WOUND, PT",
     },
     Seed {
         name: "rider-up-in-stop",
         area: Area::Set,
         what: "the rider roll is lifted when the stop begins",
         search: "winder_command_2 := bit(rest.Q OR",
-        replace: "winder_command_2 := bit(state = STOPPING OR rest.Q OR",
+        replace: "winder_command_2 := bit(state = S_STOPPING OR rest.Q OR",
     },
     Seed {
         name: "parent-end-radius",
@@ -299,14 +299,14 @@ pub const SEEDS: &[Seed] = &[
         name: "restart",
         area: Area::Faults,
         what: "the sequence goes on by itself after an acknowledge",
-        search: "                state := OFF;
+        search: "                state := S_OFF;
                 IF drives_on AND switched_on THEN
-                    state := READY;",
+                    state := S_READY;",
         replace: "                switched_on := TRUE;
-                state := SWITCHING_ON;
+                state := S_SWITCHING_ON;
                 IF drives_on AND switched_on THEN
                     thread_wanted := TRUE;
-                    state := THREADING;",
+                    state := S_THREADING;",
     },
     Seed {
         name: "load-cell-band",
@@ -357,6 +357,6 @@ pub const SEEDS: &[Seed] = &[
         area: Area::Link,
         what: "the PLC's heartbeat stands while there is a fault",
         search: "    heartbeat_plc := heartbeat_plc + 1;",
-        replace: "    IF state <> FAULTED THEN heartbeat_plc := heartbeat_plc + 1; END_IF;",
+        replace: "    IF state <> S_FAULTED THEN heartbeat_plc := heartbeat_plc + 1; END_IF;",
     },
 ];

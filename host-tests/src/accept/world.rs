@@ -4,6 +4,7 @@
 //! TCP a simulator that runs somewhere, with a PLC of which nothing is known.
 
 use std::net::SocketAddr;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -22,6 +23,12 @@ use crate::scenario::lockstep::Bench;
 pub const LOOK: u64 = 2;
 /// From look to look on a running simulator.
 const PERIOD: Duration = Duration::from_millis(LOOK * DRIVE_PERIOD_MS as u64);
+/// A course may take so long, s of the simulator's time …
+pub const LIMIT_S: f64 = 900.0;
+/// … and where a person is asked for every press.
+const ASKED_LIMIT_S: f64 = 5400.0;
+/// A person has so long for it.
+const PERSON: Duration = Duration::from_secs(60);
 /// Without a tick for this long the simulator hangs.
 const STANDSTILL_OF_TICKS: Duration = Duration::from_secs(5);
 
@@ -40,7 +47,14 @@ pub trait World {
     fn look(&mut self, own: &Commands) -> Result<Look>;
 
     /// Asks a person at the PLC's own desk to do something, where there is one.
-    fn prompt(&mut self, _what: &str) {}
+    fn prompt(&mut self, _what: &str) -> Result<()> {
+        Ok(())
+    }
+
+    /// A course may take so long, s of the simulator's time.
+    fn limit_s(&self) -> f64 {
+        LIMIT_S
+    }
 }
 
 /// The words of the commands that are the simulator's own, as stretches of the block.
@@ -114,7 +128,8 @@ pub struct Live {
     written: Option<Commands>,
     first: Option<u32>,
     last: (u32, Instant),
-    asks: bool,
+    /// Lines that a person types, where one is asked.
+    typed: Option<Receiver<String>>,
 }
 
 impl Live {
@@ -126,7 +141,7 @@ impl Live {
             written: None,
             first: None,
             last: (0, Instant::now()),
-            asks,
+            typed: asks.then(typed),
         })
     }
 }
@@ -164,9 +179,37 @@ impl World for Live {
         })
     }
 
-    fn prompt(&mut self, what: &str) {
-        if self.asks {
-            eprintln!("\x07at the PLC's desk: {what}");
+    fn prompt(&mut self, what: &str) -> Result<()> {
+        let Some(typed) = &self.typed else {
+            return Ok(());
+        };
+        eprintln!("at the PLC's desk: {what}; and Enter as you do it");
+        let began = Instant::now();
+        while began.elapsed() < PERSON {
+            interrupt::check()?;
+            match typed.recv_timeout(PERIOD) {
+                Ok(_) | Err(RecvTimeoutError::Disconnected) => return Ok(()),
+                Err(RecvTimeoutError::Timeout) => {}
+            }
         }
+        eprintln!("nobody did within {} s: going on", PERSON.as_secs());
+        Ok(())
     }
+
+    fn limit_s(&self) -> f64 {
+        self.typed.as_ref().map_or(LIMIT_S, |_| ASKED_LIMIT_S)
+    }
+}
+
+/// Lines from the keyboard, read beside.
+fn typed() -> Receiver<String> {
+    let (send, receive) = mpsc::channel();
+    thread::spawn(move || {
+        for line in std::io::stdin().lines().map_while(std::io::Result::ok) {
+            if send.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    receive
 }

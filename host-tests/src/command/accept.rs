@@ -32,6 +32,9 @@ pub struct Args {
     /// Keep the table as it is now
     #[arg(long, requires = "matrix")]
     bless: bool,
+    /// Write all that was seen to this file, too
+    #[arg(long, value_name = "RUN.csv")]
+    trace: Option<PathBuf>,
     /// Directory of the report: accept.html and accept.xml (JUnit)
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
@@ -49,6 +52,10 @@ pub fn main(args: &Args) -> Result<ExitCode> {
         (None, None) => return Ok(ExitCode::FAILURE),
     };
     write(&outcome, &what, &args.out)?;
+    if let Some(path) = &args.trace {
+        let cannot = || format!("cannot write {}", path.display());
+        fs::write(path, outcome.csv()).with_context(cannot)?;
+    }
     let mut out = io::stdout().lock();
     for (check, seen, at) in outcome.findings() {
         let at = at.map_or(String::new(), |t| format!(" (at {t:.1} s)"));
@@ -77,7 +84,8 @@ fn compare(bless: bool) -> Result<ExitCode> {
         }
         fs::write(&path, &table).with_context(|| format!("cannot write {}", path.display()))?;
     }
-    let kept = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let kept =
+        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
     if kept == table {
         return Ok(ExitCode::SUCCESS);
     }
