@@ -321,6 +321,9 @@ impl Run<'_> {
         self.wait(0.3)?;
         self.press(request::THREAD)?;
         self.until("winder_status.tension_detected", 30.0)?;
+        // the last slack bounces
+        self.wait(3.0)?;
+        self.until("winder_status.tension_detected", 10.0)?;
         self.wait(1.0)
     }
 
