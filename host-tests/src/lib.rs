@@ -4,6 +4,7 @@
 //! This library starts simulators, commands them as a winder PLC would, and shows what came of it. Its one
 //! program is the command line tool `winder`: a module of [`command`] for each subcommand.
 
+pub mod accept;
 pub mod batch;
 pub mod command;
 pub mod conformance;
@@ -11,6 +12,7 @@ pub mod figures;
 pub mod flops;
 pub mod handbook;
 pub mod interrupt;
+pub mod lesson;
 pub mod link;
 pub mod log;
 pub mod machine_file;
@@ -23,5 +25,6 @@ pub mod scenario;
 pub mod setup;
 pub mod signals;
 pub mod simulator;
+pub mod st;
 pub mod timing;
 pub mod twin;

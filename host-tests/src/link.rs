@@ -8,7 +8,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
-use model_core::image::{Commands, FEEDBACK_WORDS, Feedback, PLC_COMMAND_WORDS};
+use model_core::image::{COMMAND_WORDS, Commands, FEEDBACK_WORDS, Feedback, PLC_COMMAND_WORDS};
 use tokio_modbus::client::sync::{self, Reader as _, Writer as _};
 
 /// An answer takes milliseconds; this long without one, the simulator is gone.
@@ -46,19 +46,37 @@ impl Link {
         Ok(Feedback { words })
     }
 
+    /// Reads the command block, as its writers have left it (function code 3).
+    pub fn read_commands(&mut self) -> Result<Commands> {
+        let words = self
+            .context
+            .read_holding_registers(0, COMMAND_WORDS as u16)
+            .map_err(anyhow::Error::from)
+            .and_then(|answer| answer.map_err(|exception| anyhow!("exception: {exception}")))
+            .with_context(|| self.failed("read the command block"))?;
+        let words = words.try_into().map_err(|words: Vec<u16>| {
+            anyhow!(
+                "asked for {COMMAND_WORDS} command words, got {}",
+                words.len()
+            )
+        })?;
+        Ok(Commands { words })
+    }
+
     /// Writes the commands of a winder PLC (function code 16).
     pub fn write(&mut self, commands: &Commands) -> Result<()> {
-        self.put(&commands.words[..PLC_COMMAND_WORDS])
+        self.write_at(0, &commands.words[..PLC_COMMAND_WORDS])
     }
 
     /// Writes the whole command block, with the faults that a test puts in.
     pub fn write_all(&mut self, commands: &Commands) -> Result<()> {
-        self.put(&commands.words)
+        self.write_at(0, &commands.words)
     }
 
-    fn put(&mut self, words: &[u16]) -> Result<()> {
+    /// Writes a part of the command block, from this word on.
+    pub fn write_at(&mut self, first: usize, words: &[u16]) -> Result<()> {
         self.context
-            .write_multiple_registers(0, words)
+            .write_multiple_registers(first as u16, words)
             .map_err(anyhow::Error::from)
             .and_then(|answer| answer.map_err(|exception| anyhow!("exception: {exception}")))
             .with_context(|| self.failed("write the command block"))

@@ -129,6 +129,8 @@ pub struct MachineFaults<R> {
     pub web_break: u8,
     /// The parent roll has run down to its expire radius.
     pub parent_roll_expired: bool,
+    /// Diameter of the parent roll that is put in next, m; one that is not between expired and full is full.
+    pub next_parent_roll: R,
     /// Brakes that do not follow.
     pub brakes: Brakes<Stuck>,
     /// Share of their friction that the drums have lost.

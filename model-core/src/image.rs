@@ -4,12 +4,14 @@
 //! the HMI's interface and the signal list all come from [`SIGNALS`].
 //!
 //! Two blocks of 16-bit words, commands from the PLC and feedback to it, without holes. The commands of a winder PLC
-//! come first; behind them stand the faults that a test puts in, out of reach of a PLC that writes its own words, and
-//! behind those the words that were added since. In all words but the first 20, 0 changes nothing, so that a PLC
+//! come first; behind them stand the faults that a test puts in, out of reach of a PLC that writes its own words, behind
+//! those the PLC's words that were added since, then the operator's desk ([`crate::desk`]), and then what else a test
+//! puts in. In all words but the first 20, 0 changes nothing, so that a PLC
 //! may write the whole block as well as its two parts. A block is only ever added to: an address keeps its meaning. A value is a scaled
 //! integer; a 32-bit counter takes two words, high word first. Bit `b` of word `w` is also the single bit
 //! `16·w + b` of the block, so that a PLC can use coils or words as it likes.
 
+use crate::desk;
 use crate::exchange::{TuneAbort, TuneStep};
 use crate::link_words;
 use crate::logic;
@@ -95,8 +97,28 @@ signals! {
     WINDER_COMMAND_2: Command 30, Winder, Bits(logic::COMMAND_2_BITS), "", 1.0, 0.0 ..= 65535.0, "More commands to the winder's drive logic";
     RIDER_LOAD_SET:   Command 31, RiderRoll, U16, "%", 10.0, 0.0 ..= 200.0, "Load of the rider roll, of the machine's table; 0 is the table's own, as 100 is";
 
-    // what a test asks of the link, beyond the PLC's words again
-    RESPONSE_DELAY:   Command 32, Simulator, U16, "ms", 1.0, 0.0 ..= 1000.0, "A request over Modbus waits this long before it is done and answered";
+    // what a winder PLC shows its operator: nothing in the drives hears it
+    PLC_STATE:        Command 32, Winder, Code(desk::STATES), "", 1.0, 0.0 ..= 65535.0, "What the PLC's sequence is doing, for its operator";
+    PLC_ALARMS:       Command 33, Winder, Bits(desk::ALARM_BITS), "", 1.0, 0.0 ..= 65535.0, "Alarms that the PLC shows its operator";
+    PLC_SETS:         Command 34, Winder, U16, "", 1.0, 0.0 ..= 65535.0, "Sets that the PLC has counted";
+    PLC_LENGTH:       Command 35, Winder, U32, "m", 100.0, 0.0 ..= 42949672.0, "Length of the set, as the PLC counts it";
+
+    // the operator's desk, wired to the winder PLC: what it asks for, which the PLC reads here
+    OPERATOR_REQUEST: Command 37, Simulator, Bits(desk::REQUEST_BITS), "", 1.0, 0.0 ..= 65535.0, "Push-buttons of the operator's desk";
+    OPERATOR_V_SET:   Command 38, Simulator, U16, "m/min", 10.0, 0.0 ..= 6553.5, "Web speed that the operator asks for";
+    OPERATOR_TENSION_SET: Command 39, Simulator, U16, "N/m", 1.0, 0.0 ..= 65535.0, "Web tension per width that the operator asks for, at the core";
+    OPERATOR_TAPER:   Command 40, Simulator, U16, "%", 10.0, 0.0 ..= 100.0, "Tension taken off from the core to the set's diameter, in proportion to the diameter";
+    OPERATOR_LENGTH_SET: Command 41, Simulator, U16, "m", 1.0, 0.0 ..= 65535.0, "Length of the set; 0 does not stop at a length";
+    OPERATOR_DIAMETER_SET: Command 42, Simulator, U16, "mm", 10.0, 0.0 ..= 6553.5, "Diameter of the set; 0 does not stop at a diameter";
+    OPERATOR_PARENT:  Command 43, Simulator, U16, "mm", 10.0, 0.0 ..= 6553.5, "Diameter of the parent roll, as the operator has measured it";
+    OPERATOR_PARENT_END: Command 44, Simulator, U16, "mm", 10.0, 0.0 ..= 6553.5, "Diameter at which the parent roll is used up; 0 is a diameter of the PLC's own";
+    OPERATOR_FORCE:   Command 45, Simulator, I16, "%", 10.0, -20.0 ..= 20.0, "Winding force at the set's diameter: trim of the front drum's share, in proportion to the diameter";
+    OPERATOR_RIDER:   Command 46, Simulator, U16, "%", 10.0, 0.0 ..= 200.0, "Rider load at the set's diameter, of the machine's table, in proportion to the diameter from 100 at the core; 0 is the table's own";
+
+    // more that a test puts in
+    PARENT_ROLL_PUT_IN: Command 47, Simulator, U16, "mm", 10.0, 0.0 ..= 6553.5, "Diameter of the parent roll that is put in next; 0 is a full one";
+    PULSES_AHEAD:     Command 48, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Added to the high word of pulses_rd, so that it wraps soon";
+    RESPONSE_DELAY:   Command 49, Simulator, U16, "ms", 1.0, 0.0 ..= 1000.0, "A request over Modbus waits this long before it is done and answered";
 
     // what the drive system answers
     HEARTBEAT:        Feedback 0,  Winder, U16, "", 1.0, 0.0 ..= 65535.0, "Counts up by one each drive cycle of 10 ms";
@@ -340,8 +362,8 @@ mod tests {
     #[test]
     fn the_words_of_the_plc_stand_before_and_behind_the_simulator_s() {
         for s in SIGNALS.iter().filter(|s| s.direction == Direction::Command) {
-            let injected = (FAULT_MACHINE.word..=BUS_DELAY.word).contains(&s.word);
-            let of_simulator = injected || s.word >= RESPONSE_DELAY.word;
+            let of_simulator = (FAULT_MACHINE.word..=BUS_DELAY.word).contains(&s.word)
+                || s.word >= OPERATOR_REQUEST.word;
             assert_eq!(s.section == Section::Simulator, of_simulator, "{}", s.name);
         }
         assert_eq!(PLC_COMMAND_WORDS, usize::from(FAULT_MACHINE.word));

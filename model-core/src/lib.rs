@@ -9,6 +9,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod desk;
 pub mod drive;
 pub mod exchange;
 pub mod fixed;

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use host_tests::command::{
-    bench, conformance, demo, figures, flash, fuzz, machine, replay, run, scenario, signals, size,
-    test, timing,
+    accept, bench, conformance, demo, figures, flash, fuzz, lesson, machine, replay, run, scenario,
+    signals, size, test, timing,
 };
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
@@ -36,6 +36,14 @@ enum Command {
     ///
     /// Without a file, all that ship. Exit status 1: something was not as expected.
     Scenario(scenario::Args),
+    /// Find what is wrong with a winder PLC: plays operator and faults, watches what the PLC does, writes a report
+    ///
+    /// Exit status 1: something was found, or could not be seen.
+    Accept(accept::Args),
+    /// Learn to operate the winder: a goal, hints and a score, at the desk of the PLC that ships
+    ///
+    /// Without a name, lists the lessons. Exit status 1: not all points.
+    Lesson(lesson::Args),
     /// Play a recording again and compare it, to the bit
     Replay(replay::Args),
     /// Draw the paper's figures 7 to 14 and those of the physics, each with what to compare
@@ -91,6 +99,8 @@ fn run(cli: Cli) -> Result<ExitCode> {
         Command::Signals(args) => signals::main(&args),
         Command::Machine(args) => machine::main(&args),
         Command::Scenario(args) => scenario::main(&args),
+        Command::Accept(args) => interrupt::install().and_then(|()| accept::main(&args)),
+        Command::Lesson(args) => interrupt::install().and_then(|()| lesson::main(&args)),
         Command::Replay(args) => replay::main(&args),
         Command::Figures(args) => figures::main(&args),
         Command::Plant(options) => {

@@ -1,11 +1,13 @@
 //! The subcommands of `winder`, a module each.
 
+pub mod accept;
 pub mod bench;
 pub mod conformance;
 pub mod demo;
 pub mod figures;
 pub mod flash;
 pub mod fuzz;
+pub mod lesson;
 pub mod machine;
 pub mod replay;
 pub mod run;

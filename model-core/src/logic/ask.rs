@@ -168,6 +168,7 @@ impl<R: Real> Logic<R> {
             machine: MachineFaults {
                 web_break: commands.word(&image::FAULT_WEB_BREAK).min(u8::MAX.into()) as u8,
                 parent_roll_expired: machine & inject::PARENT_ROLL_EXPIRED != 0,
+                next_parent_roll: get(&image::PARENT_ROLL_PUT_IN) * R::of(1e-3),
                 brakes: Brakes {
                     uw: stuck(inject::BRAKE_UW_OPEN, inject::BRAKE_UW_CLOSED),
                     rd: stuck(inject::BRAKE_RD_OPEN, inject::BRAKE_RD_CLOSED),

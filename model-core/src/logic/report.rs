@@ -65,7 +65,8 @@ impl<R: Real> Logic<R> {
         f.set(&image::RIDER_LOAD, d.rider_load);
         let pulses = m.pulses_rd.wrapping_sub(self.pulses_at_core);
         f.set(&image::LENGTH_WU, f64::from(pulses) * c.metres_per_pulse);
-        f.set_double(&image::PULSES_RD, m.pulses_rd);
+        let ahead = u32::from(sight.commands.word(&image::PULSES_AHEAD)) << 16;
+        f.set_double(&image::PULSES_RD, m.pulses_rd.wrapping_add(ahead));
 
         let tune = &d.autotune;
         f.set_word(&image::AUTOTUNE_STEP, tune.step.number().into());

@@ -314,7 +314,11 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             self.winding.burst = false;
         }
         if handling.new_parent_roll {
-            self.state.r_uw = R::Sum::at(limits.full_radius);
+            let diameter = actuators.faults.machine.next_parent_roll;
+            let radius = R::of_si(diameter * R::Si::of(0.5), self.scale.r_uw);
+            let fits = radius > limits.expire_radius && radius < limits.full_radius;
+            let radius = if fits { radius } else { limits.full_radius };
+            self.state.r_uw = R::Sum::at(radius);
         }
         let strain = limits.threaded_strain;
         if handling.remove_web {

@@ -1,0 +1,177 @@
+//! The acceptance run: the reference program passes, every seeded error is found, and whatever a PLC does, it ends.
+#![allow(clippy::unwrap_used)]
+
+use host_tests::accept::checks::{Miss, markdown};
+use host_tests::accept::controller::{
+    Controller, DemoPlc, Garbage, REFERENCE, Silent, StPlc, Stopping,
+};
+use host_tests::accept::matrix::{golden, rows, table};
+use host_tests::accept::seeds::SEEDS;
+use host_tests::accept::world::{LIMIT_S, Lockstep};
+use host_tests::accept::{Outcome, accept};
+use host_tests::lesson::{Play, shipped};
+use host_tests::plc::{Plc, Recipe};
+use model_core::machine::Machine;
+
+fn run(plc: impl Controller) -> Outcome {
+    accept(&mut Lockstep::new(&Machine::news_8000(), plc).unwrap())
+}
+
+fn found(outcome: &Outcome) -> Vec<&'static str> {
+    outcome.findings().map(|(check, ..)| check.id).collect()
+}
+
+/// Each error by a check of its own area, the program without an error by none; and as the table has it.
+#[test]
+fn every_seeded_error_is_found_in_its_area() {
+    let rows = rows().unwrap();
+    assert!(
+        rows[0].marks.chars().all(|mark| mark == '.'),
+        "{}",
+        table(&rows[..1])
+    );
+    for row in &rows[1..] {
+        let area = row.area.unwrap();
+        assert!(
+            row.found.contains(&area),
+            "{}: {:?}, not {area:?}",
+            row.name,
+            row.found
+        );
+    }
+    let kept = std::fs::read_to_string(golden()).unwrap();
+    assert_eq!(
+        kept,
+        table(&rows),
+        "renew it: cargo winder accept --matrix --bless"
+    );
+}
+
+#[test]
+fn an_error_that_does_not_fit_the_program_is_refused() {
+    for seed in SEEDS {
+        let program = seed.sow(REFERENCE).unwrap();
+        assert_ne!(program, REFERENCE);
+        let twice = format!("{REFERENCE}{}", seed.search);
+        assert!(
+            seed.sow(&twice)
+                .unwrap_err()
+                .to_string()
+                .contains("2 times")
+        );
+    }
+}
+
+#[test]
+fn a_silent_plc_is_found_out() {
+    let outcome = run(Silent);
+    assert!(found(&outcome).contains(&"L01"));
+    assert!(
+        outcome
+            .course
+            .ended
+            .as_ref()
+            .unwrap()
+            .contains("heartbeat has stood")
+    );
+    // the report is written all the same, and says so
+    assert!(outcome.html("nothing").contains("heartbeat has stood"));
+    assert!(outcome.junit("nothing").contains("skipped message"));
+}
+
+#[test]
+fn a_plc_that_writes_garbage_is_found_out() {
+    for seed in [1, 2] {
+        let outcome = run(Garbage(seed));
+        assert!(found(&outcome).contains(&"L07"), "{:?}", found(&outcome));
+        assert!(outcome.duration_s() <= LIMIT_S + 1.0);
+    }
+}
+
+#[test]
+fn a_plc_that_stops_in_the_middle_is_found_out() {
+    let plc = StPlc::new(REFERENCE).unwrap();
+    // 100 s of cycles of 20 ms
+    let outcome = run(Stopping { plc, left: 5000 });
+    assert!(found(&outcome).contains(&"L01"));
+    assert!(outcome.course.ended.is_some());
+    let unseen = |id| outcome.not_seen().any(|(check, _)| check.id == id);
+    assert!(unseen("F13") && !unseen("S03"));
+}
+
+/// A program that winds one set by itself and has no operator.
+#[test]
+fn the_demo_s_plc_has_what_it_has() {
+    let recipe = Recipe {
+        machine: Machine::news_8000(),
+        diameter_m: 0.15,
+        speed_m_s: 5.0,
+    };
+    let outcome = run(DemoPlc::new(Plc::new(recipe)));
+    let id = |id: &str| {
+        &outcome
+            .verdicts
+            .iter()
+            .find(|(check, _)| check.id == id)
+            .unwrap()
+            .1
+    };
+    // it switches on without being asked, and does not hear the operator
+    assert!(
+        matches!(id("S01"), Err(Miss::Failed(..))),
+        "{:?}",
+        id("S01")
+    );
+    // what it writes is sound
+    assert!(id("L07").is_ok(), "{:?}", id("L07"));
+    assert!(!outcome.passed());
+}
+
+#[test]
+fn a_report_is_well_formed_whatever_it_says() {
+    let outcome = run(Silent);
+    let xml = outcome.junit("a \"name\" with <marks> & more");
+    let document = resvg::usvg::roxmltree::Document::parse(&xml).unwrap();
+    let cases = document
+        .descendants()
+        .filter(|node| node.has_tag_name("testcase"));
+    assert_eq!(cases.count(), outcome.verdicts.len());
+    let html = outcome.html("a \"name\" with <marks> & more");
+    assert!(html.contains("a &quot;name&quot; with &lt;marks&gt; &amp; more"));
+    // nothing is loaded from elsewhere
+    assert!(!html.contains("src=") && !html.contains("@import"));
+}
+
+#[test]
+fn lessons_are_solved_by_their_solutions_and_not_by_waiting() {
+    for lesson in shipped().unwrap() {
+        let mut play = Play::new(&lesson).unwrap();
+        for act in &lesson.solution {
+            play.act(act).unwrap();
+        }
+        let told: Vec<_> = play
+            .scores()
+            .map(|(s, earned)| (s.what.clone(), earned))
+            .collect();
+        assert_eq!(play.points(), 100, "{}: {told:?}", lesson.name);
+        let mut idle = Play::new(&lesson).unwrap();
+        while !idle.is_over() {
+            idle.tick().unwrap();
+        }
+        assert!(
+            idle.points() < 60,
+            "{}: {} points for nothing",
+            lesson.name,
+            idle.points()
+        );
+    }
+}
+
+/// The table of the page is that of the program.
+#[test]
+fn the_page_has_the_checks() {
+    let page = include_str!("../../docs/acceptance.md");
+    let (_, rest) = page.split_once("<!-- checks -->\n").unwrap();
+    let (kept, _) = rest.split_once("<!-- end -->").unwrap();
+    assert_eq!(kept, markdown(), "docs/acceptance.md");
+}
