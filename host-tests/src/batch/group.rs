@@ -299,7 +299,6 @@ impl<const SPANS: usize> Group<SPANS> {
         }
         let (mut sums, mut web) = (self.whole.sums, self.whole.web);
         let mut reached = Set::NONE;
-        sums.travel = Compensated::at(Lanes::ZERO);
         for _ in 0..self.substeps {
             self.motion.advance(&mut sums, &web, &self.whole.load);
             let x = sums.map(|sum| sum.value);
@@ -321,7 +320,6 @@ impl<const SPANS: usize> Group<SPANS> {
         }
         let mut sums = self.broken.sums;
         let mut reached = Set::NONE;
-        sums.travel = Compensated::at(Lanes::ZERO);
         for _ in 0..self.substeps {
             self.motion
                 .advance(&mut sums, &self.broken.web, &self.broken.load);

@@ -5,8 +5,7 @@
 //! Most winders glide most of the time: brakes open, rolls round and sticking to each other, layers of one thickness.
 //! A step is then the same for all of them:
 //!
-//! - [`Motion::advance`](super::motion::Motion::advance) under the motors' torques, [`Winder::substeps`] times, the way
-//!   counted from zero;
+//! - [`Motion::advance`](super::motion::Motion::advance) under the motors' torques, [`Winder::substeps`] times;
 //! - each time the web of the new state, and whether its [`Limits`](super::Limits) still hold and all is finite.
 //!
 //! So that several winders can be moved at once, each gives away its [`Winder::sums`], and takes them back with
