@@ -421,6 +421,9 @@ macro_rules! accumulator {
             fn value(&self) -> Traced<N> {
                 Sum::value(self)
             }
+            fn after_sixth(&self, rate: Traced<N>) -> Traced<N> {
+                Sum::value(self) + rate
+            }
             fn after_half(&self, rate: Traced<N>) -> Traced<N> {
                 Sum::value(self) + Traced::of(3.0) * rate
             }

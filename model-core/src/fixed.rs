@@ -218,6 +218,10 @@ impl Accumulator<Word> for Total {
         Self::word(self.0)
     }
     #[inline(always)]
+    fn after_sixth(&self, Change(sixth): Change) -> Word {
+        Self::word(self.0.wrapping_add(sixth))
+    }
+    #[inline(always)]
     fn after_half(&self, Change(sixth): Change) -> Word {
         Self::word(self.0.wrapping_add(sixth.wrapping_mul(3)))
     }

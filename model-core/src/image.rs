@@ -264,7 +264,8 @@ impl<const N: usize> Block<N> {
         u32::from(self.words[w]) << 16 | u32::from(self.words[w + 1])
     }
 
-    /// The value in the signal's unit, within its limits.
+    /// The value in the signal's unit, within its limits. Inlined, so that what is known of the signal costs nothing.
+    #[inline(always)]
     pub fn get<R: Real>(&self, signal: &Signal) -> R {
         let raw = match signal.kind {
             Kind::I16 => f32::from(self.word(signal) as i16),
@@ -290,6 +291,7 @@ impl<const N: usize> Block<N> {
     /// Sets the value, in the signal's unit, to the nearest count within its limits.
     ///
     /// Words are computed in `f32`, which holds every count of them; the counts of a 32-bit signal need `f64`.
+    #[inline(always)]
     pub fn set<R: Real>(&mut self, signal: &Signal, value: R) {
         let (low, high) = signal.limits;
         // half away from zero; the casts saturate, and take NaN to 0

@@ -185,6 +185,8 @@ pub trait Accumulator<A: Arithmetic>: Copy + Debug + Send + 'static {
     fn at(value: A) -> Self;
     /// The sum, rounded.
     fn value(&self) -> A;
+    /// Where a sixth of a step at a rate would lead.
+    fn after_sixth(&self, rate: A::Rate) -> A;
     /// Where half a step at a rate would lead.
     fn after_half(&self, rate: A::Rate) -> A;
     /// Where a step at a rate would lead.
@@ -287,6 +289,10 @@ macro_rules! floating {
                 Sum::value(self)
             }
             #[inline(always)]
+            fn after_sixth(&self, rate: $type) -> $type {
+                Sum::value(self) + rate
+            }
+            #[inline(always)]
             fn after_half(&self, rate: $type) -> $type {
                 Sum::value(self) + 3.0 * rate
             }
@@ -368,6 +374,9 @@ impl Real for f32 {
         let toward_zero = self as i32;
         toward_zero.saturating_sub(i32::from(toward_zero as f32 > self))
     }
+    fn abs(self) -> Self {
+        self.abs()
+    }
     fn is_finite(self) -> bool {
         f32::is_finite(self)
     }
@@ -400,6 +409,9 @@ impl Real for f64 {
     fn floor_i32(self) -> i32 {
         let toward_zero = self as i32;
         toward_zero.saturating_sub(i32::from(toward_zero as f64 > self))
+    }
+    fn abs(self) -> Self {
+        self.abs()
     }
     fn is_finite(self) -> bool {
         f64::is_finite(self)

@@ -64,17 +64,20 @@ impl Truth {
 }
 
 impl Record {
-    /// FNV-1a's starting value. Source: Fowler, Noll, Vo, draft-eastlake-fnv, 32 bits.
+    /// FNV's starting value. Source: Fowler, Noll, Vo, draft-eastlake-fnv, 32 bits.
     const START: u32 = 0x811c_9dc5;
-    /// FNV-1a's prime.
+    /// FNV's prime.
     const PRIME: u32 = 0x0100_0193;
 
-    /// A step, with all that it has left behind.
-    pub(crate) fn step(&mut self, variables: impl Iterator<Item = u32>) {
+    /// A step begins.
+    pub(crate) fn step(&mut self) {
         self.ticks = self.ticks.wrapping_add(1);
-        for bits in variables {
-            self.trajectory = (self.trajectory ^ bits).wrapping_mul(Self::PRIME);
-        }
+    }
+
+    /// Hashes a word of what it has left behind: h·p + x, a polynomial in FNV's prime. One instruction of a
+    /// microcontroller, where FNV itself takes two.
+    pub(crate) fn hash(&mut self, bits: u32) {
+        self.trajectory = self.trajectory.wrapping_mul(Self::PRIME).wrapping_add(bits);
     }
 }
 
@@ -100,8 +103,12 @@ impl<R: Scalar, const SPANS: usize> Plant<R, SPANS> {
     /// 4 ms of the winder.
     pub fn tick(&mut self, actuators: &Actuators<R::Si>) -> (Measurements<R::Si>, Record) {
         let measurements = self.winder.step(actuators);
-        self.record.step(self.winder.fingerprints());
-        self.record.truth = Truth::of(&self.winder);
+        self.record.step();
+        self.winder.fingerprint(|bits| self.record.hash(bits));
+        self.record.truth.broken_span = self.winder.broken_span();
+        if self.winder.winds() {
+            self.record.truth = Truth::of(&self.winder);
+        }
         (measurements, self.record)
     }
 

@@ -86,7 +86,10 @@ pub fn operate<R: Scalar>(mut tell: impl FnMut(Record)) -> Result<(), MachineErr
     for cycle in 0..CYCLES {
         image.commands = commands(&machine, cycle);
         simulator.drive_cycle(&mut image);
-        record.step(image.feedback.words.iter().map(|word| u32::from(*word)));
+        record.step();
+        for word in image.feedback.words {
+            record.hash(word.into());
+        }
         if record.ticks.is_multiple_of(TOLD_EVERY) {
             tell(record);
         }
@@ -393,7 +396,7 @@ impl<R: Scalar, const SPANS: usize> Moving<R, SPANS> {
         let force =
             torque.rd / machine.rear_drum.radius_m + torque.fd / machine.front_drum.radius_m;
 
-        let units = Units::of::<R>(machine, h);
+        let units = Units::of::<R>(machine);
         let motion = Motion::new(&One(machine, &units), h);
         let at = |x: f64, unit: f64| R::Sum::at(R::coefficient(x / unit));
         let strain = tension / (machine.web.stiffness_n_m * machine.web.width_m);
@@ -404,7 +407,6 @@ impl<R: Scalar, const SPANS: usize> Moving<R, SPANS> {
             omega_uw: at(v / r_uw, units.omega()),
             r_uw: at(r_uw, units.r_uw),
             r_wu: at(shipping_radius(machine, length), units.r_wu),
-            travel: at(0.0, units.travel),
         };
         let web = motion.web(&sums.map(|sum| sum.value()), None);
         Self {
@@ -423,7 +425,6 @@ impl<R: Scalar, const SPANS: usize> Moving<R, SPANS> {
 
     /// A step, and the web that belongs to its end.
     pub fn step(&mut self) {
-        self.sums.travel = R::Sum::at(R::ZERO);
         self.motion.advance(&mut self.sums, &self.web, &self.load);
         self.web = self.motion.web(&self.values(), None);
     }

@@ -180,7 +180,7 @@ pub fn side_by_side<const SPANS: usize>(
     }
     let mut gliding: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (i, run) in runs.iter_mut().enumerate() {
-        if run.winder.glides(&Brakes::default()) {
+        if run.winder.glides(&Actuators::default()) {
             gliding.entry(run.winder.substeps()).or_default().push(i);
         } else {
             go_alone(run, schedule, progress)?;
@@ -299,7 +299,6 @@ impl<const SPANS: usize> Group<SPANS> {
         }
         let (mut sums, mut web) = (self.whole.sums, self.whole.web);
         let mut reached = Set::NONE;
-        sums.travel = Compensated::at(Lanes::ZERO);
         for _ in 0..self.substeps {
             self.motion.advance(&mut sums, &web, &self.whole.load);
             let x = sums.map(|sum| sum.value);
@@ -321,7 +320,6 @@ impl<const SPANS: usize> Group<SPANS> {
         }
         let mut sums = self.broken.sums;
         let mut reached = Set::NONE;
-        sums.travel = Compensated::at(Lanes::ZERO);
         for _ in 0..self.substeps {
             self.motion
                 .advance(&mut sums, &self.broken.web, &self.broken.load);
@@ -349,7 +347,7 @@ impl<const SPANS: usize> Group<SPANS> {
     /// A winder that goes alone joins the others once it glides.
     fn join_if_gliding(&mut self, lane: usize, actuators: &Actuators<f32>) {
         let run = &self.runs[lane];
-        if !run.winder.glides(&actuators.brakes) {
+        if !run.winder.glides(actuators) {
             return;
         }
         self.alone.remove(lane);

@@ -170,6 +170,10 @@ impl Accumulator<Lanes> for Compensated<Lanes> {
         self.value
     }
     #[inline(always)]
+    fn after_sixth(&self, rate: Lanes) -> Lanes {
+        self.value + rate
+    }
+    #[inline(always)]
     fn after_half(&self, rate: Lanes) -> Lanes {
         self.value + Lanes::all(3.0) * rate
     }

@@ -43,7 +43,7 @@ impl Balance {
                 let (x, t) = (bench.x(), bench.t());
                 let torque = bench.pull(tension, acceleration);
                 let (x_next, t_next) = (bench.x(), bench.t());
-                travel += x_next.travel;
+                travel += bench.travel();
                 taken += 0.5 * H * (inflow(&x) + inflow(&x_next));
                 let flows = powers(&m, &x, &t, &torque).into_iter();
                 for (a, b) in flows.zip(powers(&m, &x_next, &t_next, &torque)) {

@@ -127,7 +127,6 @@ pub fn motion<const SPANS: usize>(
             omega_uw: parent / parent_inertia(m, x.r_uw),
             r_uw: -m.web.caliper_m * v_uw / (TAU * x.r_uw),
             r_wu,
-            travel: v,
         },
         tension: t,
     }
@@ -152,7 +151,6 @@ pub fn steady<const SPANS: usize>(
         omega_uw: unstrained / r_uw,
         r_uw,
         r_wu,
-        travel: 0.0,
     }
 }
 
@@ -243,6 +241,11 @@ impl<R: Scalar, const SPANS: usize> Bench<R, SPANS> {
     /// The state as `f64`.
     pub fn x(&self) -> State<f64, SPANS> {
         self.winder.state().map(Real::to_f64)
+    }
+
+    /// Way of the rear drum's surface in the last step as `f64`, m.
+    pub fn travel(&self) -> f64 {
+        self.winder.travel().to_f64()
     }
 
     /// The tensions as `f64`, N.

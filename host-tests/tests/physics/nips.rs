@@ -342,7 +342,7 @@ fn tight_layers_are_thinner<R: Float>() {
     let steps = 500;
     for _ in 0..steps {
         bench.pull(2800.0, 0.0);
-        length += bench.x().travel;
+        length += bench.travel();
         let winding = bench.winder.winding();
         let (load, front) = (winding.nip_load[0].to_f64(), winding.nip_force[1].to_f64());
         let w = &m.wound_on_tension;

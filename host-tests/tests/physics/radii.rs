@@ -59,7 +59,7 @@ fn radii_follow_the_length<R: Float>() {
         while wound < length {
             bench.pull(t, 0.0);
             let x = bench.x();
-            wound += x.travel;
+            wound += bench.travel();
             let v = x.omega_uw * x.r_uw;
             unwound += 0.5 * H * (v_uw + v);
             v_uw = v;
@@ -89,7 +89,7 @@ fn an_hour_of_thread_speed_moves_the_radii_by_the_closed_form<R: Float>() {
     for _ in 0..(3600.0 / H).round() as u32 {
         bench.pull(stall, 0.0);
         let x = bench.x();
-        wound += x.travel;
+        wound += bench.travel();
         unwound += H * x.omega_uw * x.r_uw;
     }
     let end = bench.x();

@@ -137,19 +137,9 @@ impl<R: Real> Drive<R> {
         self.heat_motors(m, &torque);
         let assist = command.brake_assist && (self.assisted || self.unwind.at_limit());
         self.assisted = assist;
-        let actuators = Actuators {
-            torque,
-            brakes: Brakes {
-                uw: command.brakes.uw || assist,
-                ..command.brakes
-            },
-            rider: command.rider,
-            handling: command.handling,
-            faults: command.faults,
-        };
         let status = self.status(m, v, torque, &command.rider);
         self.last_tension = m.tension;
-        (actuators, status)
+        (act(command, torque, assist), status)
     }
 
     fn follow_references(&mut self, command: &DriveCommand<R>, v: R, tuned: Option<Loop>) {
@@ -396,6 +386,22 @@ impl<R: Real> Drive<R> {
             overloaded: self.overload.map(|overload| overload.is_exhausted()),
             autotune: *self.tuner.report(),
         }
+    }
+}
+
+/// What acts on the winder: torques, brakes with the unwind's that assists or not, and what is passed through. Not
+/// inlined: that is copied in one piece so, not byte by byte.
+#[inline(never)]
+fn act<R: Real>(command: &DriveCommand<R>, torque: BySection<R>, assist: bool) -> Actuators<R> {
+    Actuators {
+        torque,
+        brakes: Brakes {
+            uw: command.brakes.uw || assist,
+            ..command.brakes
+        },
+        rider: command.rider,
+        handling: command.handling,
+        faults: command.faults,
     }
 }
 

@@ -61,15 +61,16 @@ impl<R: Real> Motor<R> {
     /// One period of a torque at a speed.
     pub fn heat(&self, overload: &mut Overload<R>, torque: R, omega: R) {
         // above base speed the current goes with the power
-        let current = (torque * self.per_torque)
-            .abs()
-            .max((torque * omega * self.per_power).abs());
-        let rise = self.heating * (current * current - R::ONE);
-        overload.used = (overload.used + rise).clamp(R::ZERO, R::ONE);
+        let (low, high) = (torque * self.per_torque, torque * omega * self.per_power);
+        let heat = (low * low).max(high * high);
+        overload.used += self.heating * (heat - R::ONE);
         if overload.used >= R::ONE {
-            overload.exhausted = true;
+            *overload = Overload {
+                used: R::ONE,
+                exhausted: true,
+            };
         } else if overload.used <= R::ZERO {
-            overload.exhausted = false;
+            *overload = Overload::default();
         }
     }
 

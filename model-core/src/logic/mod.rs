@@ -34,7 +34,7 @@ pub use words::{
 };
 
 use crate::exchange::{
-    Brakes, BySection, DriveCommand, DriveStatus, Handling, Loop, Measurements, TuneStep,
+    Autotune, Brakes, BySection, DriveCommand, DriveStatus, Handling, Loop, Measurements, TuneStep,
 };
 use crate::image::{self, Commands, Feedback};
 use crate::machine::Machine;
@@ -126,6 +126,8 @@ pub struct Logic<R> {
     frozen: Option<R>,
     /// Brakes as they were asked for in the last cycle.
     asked: Brakes<bool>,
+    /// What the answer tells of auto-tune.
+    told: Autotune<R>,
     one_shot: OneShot<R>,
     answer: Feedback,
 }
@@ -221,6 +223,7 @@ impl<R: Real> Logic<R> {
             tuning_cycles: 0,
             frozen: None,
             asked: Brakes::default(),
+            told: Autotune::default(),
             one_shot: OneShot::default(),
             answer: Feedback::default(),
         }

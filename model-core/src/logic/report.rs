@@ -3,6 +3,7 @@
 //! Not here: the tasks' times; whoever runs the tasks knows them.
 
 use super::{Fault, Logic, Mode, Refusal, Sight, ask, status};
+use crate::exchange::Autotune;
 use crate::image::{self, Feedback};
 use crate::profidrive::zsw1;
 use crate::real::Real;
@@ -68,17 +69,10 @@ impl<R: Real> Logic<R> {
         let ahead = u32::from(sight.commands.word(&image::PULSES_AHEAD)) << 16;
         f.set_double(&image::PULSES_RD, m.pulses_rd.wrapping_add(ahead));
 
-        let tune = &d.autotune;
-        f.set_word(&image::AUTOTUNE_STEP, tune.step.number().into());
-        f.set(&image::AUTOTUNE_PROGRESS, tune.progress);
-        f.set_word(&image::AUTOTUNE_ABORT, tune.abort.number().into());
-        f.set(&image::AUTOTUNE_INERTIA, tune.inertia);
-        f.set(&image::AUTOTUNE_FRICTION, tune.friction);
-        f.set(&image::AUTOTUNE_STIFFNESS, tune.stiffness);
-        f.set(&image::AUTOTUNE_GAIN_OLD, tune.old.gain);
-        f.set(&image::AUTOTUNE_GAIN_NEW, tune.new.gain);
-        f.set(&image::AUTOTUNE_TIME_OLD, tune.old.time);
-        f.set(&image::AUTOTUNE_TIME_NEW, tune.new.time);
+        if d.autotune != self.told {
+            self.told = d.autotune;
+            tell_autotune(&d.autotune, f);
+        }
     }
 
     fn status(&self, sight: &Sight<R>, at_speed: bool) -> u16 {
@@ -104,4 +98,18 @@ impl<R: Real> Logic<R> {
         .filter_map(|(on, bit)| on.then_some(bit))
         .sum()
     }
+}
+
+/// What auto-tune tells.
+fn tell_autotune<R: Real>(tune: &Autotune<R>, f: &mut Feedback) {
+    f.set_word(&image::AUTOTUNE_STEP, tune.step.number().into());
+    f.set(&image::AUTOTUNE_PROGRESS, tune.progress);
+    f.set_word(&image::AUTOTUNE_ABORT, tune.abort.number().into());
+    f.set(&image::AUTOTUNE_INERTIA, tune.inertia);
+    f.set(&image::AUTOTUNE_FRICTION, tune.friction);
+    f.set(&image::AUTOTUNE_STIFFNESS, tune.stiffness);
+    f.set(&image::AUTOTUNE_GAIN_OLD, tune.old.gain);
+    f.set(&image::AUTOTUNE_GAIN_NEW, tune.new.gain);
+    f.set(&image::AUTOTUNE_TIME_OLD, tune.old.time);
+    f.set(&image::AUTOTUNE_TIME_NEW, tune.new.time);
 }

@@ -5,8 +5,7 @@
 //! Most winders glide most of the time: brakes open, rolls round and sticking to each other, layers of one thickness.
 //! A step is then the same for all of them:
 //!
-//! - [`Motion::advance`](super::motion::Motion::advance) under the motors' torques, [`Winder::substeps`] times, the way
-//!   counted from zero;
+//! - [`Motion::advance`](super::motion::Motion::advance) under the motors' torques, [`Winder::substeps`] times;
 //! - each time the web of the new state, and whether its [`Limits`](super::Limits) still hold and all is finite.
 //!
 //! So that several winders can be moved at once, each gives away its [`Winder::sums`], and takes them back with
@@ -15,16 +14,20 @@
 use super::Winder;
 use super::friction::Delay;
 use super::rk4::State;
-use crate::exchange::Brakes;
+use crate::exchange::{Actuators, Brakes, Faults, Handling, Rider};
 use crate::real::{Ring, Scalar};
 
 impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
-    /// Nothing but its motion moves the winder in a step with these brakes commanded, if nobody handles it and no
-    /// fault is put in.
-    pub fn glides(&self, brakes: &Brakes<bool>) -> bool {
+    /// Nothing but its motion moves the winder in a step under these actuators.
+    pub fn glides(&self, actuators: &Actuators<R::Si>) -> bool {
         let open = |delay: &Delay, on: bool| !on && delay.rests();
+        let brakes = &actuators.brakes;
+        let asked = actuators.rider != Rider::default()
+            || actuators.handling != Handling::default()
+            || actuators.faults != Faults::default();
         let apart = self.holders.winds() || self.eccentricity.present() || self.tail > R::Si::ZERO;
-        !apart
+        !asked
+            && !apart
             && open(&self.delay.uw, brakes.uw)
             && open(&self.delay.rd, brakes.rd)
             && open(&self.delay.fd, brakes.fd)

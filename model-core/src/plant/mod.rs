@@ -51,9 +51,13 @@ pub struct Winder<R: Scalar, const SPANS: usize> {
     limits: Limits<R>,
     scale: Scale<R>,
     substeps: u32,
+    /// Step of integration, s.
+    step: R::Si,
     state: State<R::Sum, SPANS, 0>,
     /// Speeds of front drum, rider roll and shipping roll, where the windup may slip.
     apart: [R::Sum; ROLLS],
+    /// Way of the rear drum's surface in the last step, m.
+    travel: R::Si,
     /// Strain rates and tensions that belong to the state.
     web: Web<R, SPANS>,
     /// The web is led through the machine and whole.
@@ -129,7 +133,6 @@ struct Scale<R: Scalar> {
     omega_rolls: R::Unit,
     r_uw: R::Unit,
     r_wu: R::Unit,
-    travel: R::Unit,
     one: R::Unit,
 }
 
@@ -152,7 +155,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         }
         let substeps = modes::substeps(machine, h);
         let step = h / f64::from(substeps);
-        let units = Units::of::<R>(machine, h);
+        let units = Units::of::<R>(machine);
         units.fit::<R>(machine, step)?;
         let limits = Limits::new(&One(machine, &units));
         let zero = R::Sum::at(R::ZERO);
@@ -161,6 +164,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             holders: Holders::new(machine, step),
             scale: Scale::new(&units),
             substeps,
+            step: R::Si::of(step),
             state: State {
                 strain: [zero; SPANS],
                 v: [zero; SPANS],
@@ -168,10 +172,10 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
                 omega_uw: zero,
                 r_uw: R::Sum::at(limits.full_radius),
                 r_wu: R::Sum::at(limits.core_radius),
-                travel: zero,
             },
             limits,
             apart: [zero; ROLLS],
+            travel: R::Si::ZERO,
             web: Web::none(),
             threaded: false,
             broken_span: 0,
@@ -204,14 +208,14 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             rd: stuck.rd.acts_on(self.delay.rd.step(brakes.rd)),
             fd: stuck.fd.acts_on(self.delay.fd.step(brakes.fd)),
         };
-        self.state.travel = R::Sum::at(R::ZERO);
+        self.travel = R::Si::ZERO;
         let trails = self.tail > R::Si::ZERO;
         for _ in 0..self.substeps {
             self.advance(actuators);
             self.break_web_if_due();
         }
         if trails {
-            self.tail -= self.state.travel.value().to_si(self.scale.travel);
+            self.tail -= self.travel;
         }
         self.measure(&actuators.faults.sensors)
     }
@@ -259,13 +263,17 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             omega_uw: x.omega_uw.to_si(scale.omega),
             r_uw: x.r_uw.to_si(scale.r_uw),
             r_wu: x.r_wu.to_si(scale.r_wu),
-            travel: x.travel.to_si(scale.travel),
         }
     }
 
-    /// Bits of every state variable, in a fixed order: equal trajectories have equal ones.
-    pub fn fingerprints(&self) -> impl Iterator<Item = u32> {
-        self.values().iter().map(R::fingerprint)
+    /// Takes the bits of every state variable, in a fixed order: equal trajectories have equal ones. Where the windup
+    /// cannot slip, its speed is one of them.
+    pub fn fingerprint(&self, mut take: impl FnMut(u32)) {
+        let mut take = |sum: R::Sum| take(sum.value().fingerprint());
+        self.state.map(&mut take);
+        if self.holders.slips {
+            self.apart.into_iter().for_each(take);
+        }
     }
 
     /// Puts the machine into a state, in SI; the web stays threaded or not. Where the windup cannot slip, all of it
@@ -280,7 +288,6 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             omega_uw: at(state.omega_uw, scale.omega),
             r_uw: at(state.r_uw, scale.r_uw),
             r_wu: at(state.r_wu, scale.r_wu),
-            travel: at(state.travel, scale.travel),
         };
         if self.holders.slips {
             let v = state.speeds();
@@ -292,6 +299,11 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         }
     }
 
+    /// Way of the rear drum's surface in the last step, m: ground truth.
+    pub fn travel(&self) -> R::Si {
+        self.travel
+    }
+
     /// Tensions of the spans, N: ground truth.
     pub fn tension(&self) -> [R::Si; SPANS] {
         self.web.tension.map(|t| t.to_si(self.scale.force))
@@ -300,6 +312,11 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     /// How the shipping roll is being wound: ground truth. Known only where slip or layers that compress are computed.
     pub fn winding(&self) -> &Winding<R::Si> {
         &self.winding
+    }
+
+    /// It is computed how the shipping roll is being wound.
+    pub fn winds(&self) -> bool {
+        self.holders.winds()
     }
 
     /// The web is led through the machine and whole.
@@ -441,9 +458,16 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
     }
 
     /// Moves everything, the windup as one body.
+    #[inline(always)]
     fn turn_windup(&mut self, whole: Whole<R>, load: &Load<R, (), SPANS>) {
         let load = load.on(whole);
-        self.motion.advance(&mut self.state, &self.web, &load);
+        let v_rd = self.motion.advance(&mut self.state, &self.web, &load);
+        self.go(v_rd);
+    }
+
+    /// The way at a mean speed over a step of integration.
+    fn go(&mut self, v_rd: R) {
+        self.travel += v_rd.to_si(self.scale.speed) * self.step;
     }
 
     /// What drives the windup as one body.
@@ -468,7 +492,8 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         } else {
             let parts = parts.map(|force| R::of_si(force, self.scale.force));
             let mut sums = self.state.with_apart(self.apart);
-            self.motion.advance(&mut sums, &self.web, &load.on(parts));
+            let v_rd = self.motion.advance(&mut sums, &self.web, &load.on(parts));
+            self.go(v_rd);
             (self.state, self.apart) = (sums.with_apart([]), sums.windup);
         }
         if !holding.goes_on() {
@@ -609,7 +634,7 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let uw = x.omega_uw.value().to_si(scale.omega);
         let sight = Sight {
             omega: BySection { uw, rd, fd, rr },
-            travel: x.travel.value().to_si(scale.travel),
+            travel: self.travel,
             r_wu: x.r_wu.value().to_si(scale.r_wu),
             rider_lifted: self.holders.nips.rider_lifted(),
         };
@@ -699,7 +724,6 @@ impl<R: Scalar> Scale<R> {
             omega_rolls: R::unit(units.omega_rolls()),
             r_uw: R::unit(units.r_uw),
             r_wu: R::unit(units.r_wu),
-            travel: R::unit(units.travel),
             one: R::unit(1.0),
         }
     }

@@ -17,8 +17,8 @@ use crate::real::{Accumulator, Arithmetic};
 pub struct Motion<A: Arithmetic, const SPANS: usize> {
     /// The web.
     pub spans: Spans<A, SPANS>,
-    /// The roll at the end of each span but the last, where the windup is.
-    idle: [Option<Idle<A>>; SPANS],
+    /// The roll at the end of each span; at the end of the last is the windup, and none here.
+    idle: [Idle<A>; SPANS],
     unwind: Unwind<A>,
     /// The windup.
     pub windup: Windup<A>,
@@ -57,7 +57,13 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
     pub fn new(machines: &impl Machines<A>, h: f64) -> Self {
         Self {
             spans: Spans::new(machines, h),
-            idle: core::array::from_fn(|i| (i + 1 < SPANS).then(|| Idle::new(machines, i, h))),
+            idle: core::array::from_fn(|i| {
+                if i + 1 < SPANS {
+                    Idle::new(machines, i, h)
+                } else {
+                    Idle::none(machines)
+                }
+            }),
             unwind: Unwind::new(machines, h),
             windup: Windup::new(machines, h),
         }
@@ -80,23 +86,23 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
         }
     }
 
-    /// Moves everything by a step; `web` belongs to the state at its start.
+    /// Moves everything by a step; `web` belongs to the state at its start. Gives the mean speed of the rear drum.
     #[inline(always)]
     pub fn advance<W: windup::Load<A, APART>, const APART: usize>(
         &self,
         sums: &mut State<A::Sum, SPANS, APART>,
         web: &Web<A, SPANS>,
         load: &Load<A, W, SPANS>,
-    ) {
+    ) -> A {
         if load.threaded && load.offsets.is_none() {
             let taut = Load {
                 threaded: true,
                 offsets: None,
                 ..*load
             };
-            self.integrate(sums, web, &taut);
+            self.integrate(sums, web, &taut)
         } else {
-            self.advance_otherwise(sums, web, load);
+            self.advance_otherwise(sums, web, load)
         }
     }
 
@@ -108,8 +114,8 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
         sums: &mut State<A::Sum, SPANS, APART>,
         web: &Web<A, SPANS>,
         load: &Load<A, W, SPANS>,
-    ) {
-        self.integrate(sums, web, load);
+    ) -> A {
+        self.integrate(sums, web, load)
     }
 
     #[inline(always)]
@@ -118,9 +124,9 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
         sums: &mut State<A::Sum, SPANS, APART>,
         web: &Web<A, SPANS>,
         load: &Load<A, W, SPANS>,
-    ) {
+    ) -> A {
         let k1 = self.rates(&sums.map(|sum| sum.value()), web, load);
-        rk4::advance(sums, k1, &Loaded { motion: self, load });
+        rk4::advance(sums, k1, &Loaded { motion: self, load })
     }
 
     #[inline(always)]
@@ -137,9 +143,12 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
         let v_uw = x.omega_uw * x.r_uw;
         State {
             strain: web.strain_rate,
-            v: core::array::from_fn(|i| match &self.idle[i] {
-                Some(idle) => idle.acceleration(x.v[i], web.tension[i], web.tension[i + 1]),
-                None => rd,
+            v: core::array::from_fn(|i| {
+                if i + 1 < SPANS {
+                    self.idle[i].acceleration(x.v[i], web.tension[i], web.tension[i + 1])
+                } else {
+                    rd
+                }
             }),
             windup: apart,
             omega_uw: self.unwind.spin(load.uw, web.tension[0], v_uw, x.r_uw),
@@ -149,7 +158,6 @@ impl<A: Arithmetic, const SPANS: usize> Motion<A, SPANS> {
                 A::no_rate()
             },
             r_wu: roll.radius_rate,
-            travel: windup.way(v_rd),
         }
     }
 }

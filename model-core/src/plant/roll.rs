@@ -24,6 +24,14 @@ impl<A: Arithmetic> Idle<A> {
         }
     }
 
+    /// No roll: nothing moves it.
+    pub fn none(machines: &impl Machines<A>) -> Self {
+        Self {
+            per_mass: machines.gain(|_, _| 0.0),
+            friction: A::ZERO,
+        }
+    }
+
     /// (J/R²)·V̇ = t_down − t_up − c·V
     #[inline(always)]
     pub fn acceleration(&self, v: A, t_up: A, t_down: A) -> A::Rate {

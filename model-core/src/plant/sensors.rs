@@ -96,7 +96,7 @@ impl<R: Real> Sensors<R> {
     ///
     /// The load cells carry F = (t_before + t_after)·sin(β/2) + tare and show F/(2·sin(β_cal/2)), filtered. Where
     /// they do not feel both spans, t_after stands for t_before. A drift adds to the tare as time goes.
-    #[inline]
+    #[inline(always)]
     pub fn look(
         &mut self,
         sight: &Sight<R>,

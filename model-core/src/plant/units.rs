@@ -33,8 +33,6 @@ pub struct Units {
     pub r_rolls: f64,
     /// Of the windup's masses at the surface, kg.
     pub mass: f64,
-    /// Of the way in a step, m.
-    pub travel: f64,
 }
 
 /// Where the coefficients of a motion come from: one machine, or several side by side.
@@ -68,11 +66,10 @@ impl Units {
         r_wu: 1.0,
         r_rolls: 1.0,
         mass: 1.0,
-        travel: 1.0,
     };
 
-    /// The units that `R` counts a valid machine in, stepped every `h` seconds.
-    pub fn of<R: Scalar>(machine: &Machine, h: f64) -> Self {
+    /// The units that `R` counts a valid machine in.
+    pub fn of<R: Scalar>(machine: &Machine) -> Self {
         if !R::PER_UNIT {
             return Self::SI;
         }
@@ -91,7 +88,6 @@ impl Units {
                 .iter()
                 .fold(f64::INFINITY, |r, roll| r.min(roll.radius_m)),
             mass: machine.windup_mass_kg(shipping.full_radius_m),
-            travel: speed * h,
         }
     }
 

@@ -54,8 +54,6 @@ pub struct Windup<A: Arithmetic> {
     /// h/6 over 1 kg, and over the mass of each roll.
     per_mass: A::Gain,
     per_roll: [A::Gain; ROLLS],
-    /// h/6.
-    way: A::Gain,
 }
 
 /// The shipping roll at one radius.
@@ -157,7 +155,6 @@ impl<A: Arithmetic> Windup<A> {
             per_roll: each(|j| {
                 machines.gain(|m, u| sixth * u.force / (roll(m, j).mass_kg() * u.speed))
             }),
-            way: machines.gain(|_, u| sixth * u.speed / u.travel),
         }
     }
 
@@ -193,12 +190,6 @@ impl<A: Arithmetic> Windup<A> {
     #[inline(always)]
     pub fn mass(&self, roll: &ShippingRoll<A>) -> A {
         self.drum_mass + roll.mass
-    }
-
-    /// The way of the rear drum's surface.
-    #[inline(always)]
-    pub fn way(&self, v_rd: A) -> A::Rate {
-        v_rd.rate(self.way)
     }
 }
 
