@@ -93,19 +93,19 @@ fn lints() -> Result<()> {
         return Ok(());
     }
     cargo(&["clippy", "--all-targets", "--", "-D", "warnings"])?;
-    clippy(
+    lint(
         &["board-mps2", "board-mps2-twin", "board-nucleo-h743zi2"],
         Some(TARGET),
     )?;
-    clippy(&["board-nucleo-f207zg"], Some(TARGET_SOFT))?;
-    clippy(
+    lint(&["board-nucleo-f207zg"], Some(TARGET_SOFT))?;
+    lint(
         &["qemu-pace", "qemu-count", "qemu-trace", "qemu-plugin"],
         None,
     )
 }
 
 /// Lints packages for a target, or for this PC.
-fn clippy(packages: &[&str], target: Option<&str>) -> Result<()> {
+fn lint(packages: &[&str], target: Option<&str>) -> Result<()> {
     let mut arguments = vec!["clippy", "--release"];
     for package in packages {
         arguments.extend(["-p", *package]);
