@@ -196,7 +196,7 @@ impl<'de> Visitor<'de> for Commands<'_> {
                 .replace(Detail::new(name, "", "not a whole number"));
             let number: f64 = map.next_value()?;
             let counts = number as i32;
-            if f64::from(counts) != number {
+            if number - f64::from(counts) != 0.0 {
                 continue;
             }
             *self.wrong = before;
