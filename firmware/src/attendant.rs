@@ -8,6 +8,8 @@ use model_core::machine::Machine;
 
 /// What an attendant wants of the simulator beyond the image. Where plant and regulators run in tasks of their own, it
 /// takes some drive cycles until it is done.
+// There is no heap to put the machine on, and an order is rare.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub enum Order {
     /// Keep the state as it is between two drive cycles.

@@ -72,7 +72,7 @@ impl<J: Journal> Lockstep<J> {
         let s = &self.simulator;
         State {
             plant: s.plant.clone(),
-            drive: s.drive.clone(),
+            drive: s.drive,
             logic: s.logic.clone(),
             actuators: *s.actuators(),
             command: *s.command(),

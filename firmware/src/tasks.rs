@@ -134,6 +134,7 @@ pub struct Exchange<R: Scalar> {
     command: Mailbox<DriveCommand<R::Si>>,
     cycle: Mailbox<Cycle<R::Si>>,
     plant_hatch: Hatch<(Plant<R, SPANS>, Actuators<R::Si>)>,
+    #[allow(clippy::type_complexity, reason = "a pair, like the one above")]
     drive_hatch: Hatch<(Drive<R::Si>, DriveCommand<R::Si>)>,
     /// Drive cycles so far; wraps.
     cycles: AtomicU32,
@@ -313,7 +314,7 @@ pub async fn drive<W: Stopwatch, R: Scalar>(
     let mut number = 0_u32;
     loop {
         rate.release().await;
-        let own = || (drive.clone(), exchange.command.get());
+        let own = || (*drive, exchange.command.get());
         if let Some((other, command)) = exchange.drive_hatch.pass(number, own) {
             *drive = other;
             exchange.command.set(command);

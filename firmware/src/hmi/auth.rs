@@ -125,7 +125,8 @@ impl Auth {
 
     /// Seconds until the next password may be tried; 0 when it may.
     pub fn pause_s(&self, now: Instant) -> u64 {
-        self.pause.saturating_duration_since(now).as_secs() + u64::from(now < self.pause)
+        let pause = self.pause.saturating_duration_since(now);
+        pause.as_millis().div_ceil(1000)
     }
 
     /// Counts a try before it is looked at, so that many at once are no way around the pause.

@@ -194,7 +194,11 @@ impl<'de> Visitor<'de> for Commands<'_> {
             let before = self
                 .wrong
                 .replace(Detail::new(name, "", "not a whole number"));
-            let counts: i32 = map.next_value()?;
+            let number: f64 = map.next_value()?;
+            let counts = number as i32;
+            if number - f64::from(counts) != 0.0 {
+                continue;
+            }
             *self.wrong = before;
             match setting(name, counts) {
                 Ok(setting) => {

@@ -16,6 +16,9 @@
 //! | [`panel`] | the operator panel's sequence |
 //! | `events`, `recorder` | what has happened, and every command with its cycle |
 
+// A refusal with its details has no heap to be put on.
+#![allow(clippy::result_large_err, clippy::large_enum_variant)]
+
 mod answer;
 pub mod assets;
 mod auth;

@@ -1,5 +1,8 @@
 //! The HMI's interface, by foreign clients: what it says, what it refuses, and that a refusal changes nothing.
 
+// The helpers are of tests, too.
+#![allow(clippy::unwrap_used)]
+
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::thread::sleep;
