@@ -53,6 +53,7 @@ pub const EPISODES: &[Row] = &[
     ("front drum's brake does not close", brake),
     ("rider roll's motor is warm", hot),
     ("link is lost", link),
+    ("heartbeat wraps", heartbeat),
 ];
 
 fn before_the_start(run: &mut Run) -> Done {
@@ -402,4 +403,10 @@ fn link(run: &mut Run) -> Done {
     run.wait(4.0)?;
     run.mark("link, over");
     run.recover()
+}
+
+/// The drives' heartbeat has 16 bits and counts every 10 ms: it wraps every 11 minutes.
+fn heartbeat(run: &mut Run) -> Done {
+    run.wrap(250.0)?;
+    run.wait(2.0)
 }
