@@ -178,8 +178,13 @@ fn wind(run: &mut Run, began: &'static str) -> Done {
 
 fn set_to_length(run: &mut Run) -> Done {
     run.recover()?;
-    // 42 m before the counter wraps
-    run.inject(&image::PULSES_AHEAD, u16::MAX, 0);
+    // the counter wraps within the next 65 536 pulses, 43 m
+    let shown = run
+        .now()
+        .map_or(0, |now| now.image.feedback.double(&image::PULSES_RD));
+    let high = (shown >> 16) as u16;
+    let ahead = run.own(&image::PULSES_AHEAD).wrapping_add(u16::MAX - high);
+    run.inject(&image::PULSES_AHEAD, ahead, 0);
     run.wait(0.5)?;
     run.ask(&image::OPERATOR_LENGTH_SET, LENGTH)?;
     run.mark("core of the first set");

@@ -292,6 +292,11 @@ impl Run<'_> {
         self.course.marks.push((name, self.course.samples.len()));
     }
 
+    /// What stands in a word of the simulator's own.
+    pub fn own(&self, signal: &Signal) -> u16 {
+        self.own.word(signal)
+    }
+
     /// Takes everything back that was put in, and the desk.
     fn leave(&mut self) {
         self.own = Commands::of(&Machine::news_8000());
