@@ -596,7 +596,7 @@ fn emergency_mode(c: &Course) -> Verdict {
 fn parent_roll(c: &Course) -> Verdict {
     const ABOVE: f64 = 2.0;
     c.never(
-        c.between("last layers", "used up")?,
+        c.reached("last layers", "used up")?,
         "the web has run off the roll",
         |s| s.value(&image::BROKEN_SPAN) > 0.0 || s.has(&WINDER_STATUS, status::WEB_BREAK),
     )?;

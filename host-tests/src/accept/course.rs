@@ -53,6 +53,7 @@ pub const EPISODES: &[Row] = &[
     ("front drum's brake does not close", brake),
     ("rider roll's motor is warm", hot),
     ("link is lost", link),
+    ("heartbeat wraps", heartbeat),
 ];
 
 fn before_the_start(run: &mut Run) -> Done {
@@ -177,8 +178,13 @@ fn wind(run: &mut Run, began: &'static str) -> Done {
 
 fn set_to_length(run: &mut Run) -> Done {
     run.recover()?;
-    // 42 m before the counter wraps
-    run.inject(&image::PULSES_AHEAD, u16::MAX, 0);
+    // the counter wraps within the next 65 536 pulses, 43 m
+    let shown = run
+        .now()
+        .map_or(0, |now| now.image.feedback.double(&image::PULSES_RD));
+    let high = (shown >> 16) as u16;
+    let ahead = run.own(&image::PULSES_AHEAD).wrapping_add(u16::MAX - high);
+    run.inject(&image::PULSES_AHEAD, ahead, 0);
     run.wait(0.5)?;
     run.ask(&image::OPERATOR_LENGTH_SET, LENGTH)?;
     run.mark("core of the first set");
@@ -402,4 +408,10 @@ fn link(run: &mut Run) -> Done {
     run.wait(4.0)?;
     run.mark("link, over");
     run.recover()
+}
+
+/// The drives' heartbeat has 16 bits and counts every 10 ms: it wraps every 11 minutes.
+fn heartbeat(run: &mut Run) -> Done {
+    run.wrap(250.0)?;
+    run.wait(2.0)
 }

@@ -9,7 +9,7 @@ use model_core::image::{self, Commands, Image, Kind, Signal};
 use model_core::machine::Machine;
 
 use super::course::EPISODES;
-use super::world::{Look, World};
+use super::world::{LOOK, Look, World};
 use crate::scenario::place::Condition;
 use crate::scenario::{CYCLES_PER_S, seconds};
 
@@ -199,6 +199,24 @@ impl Run<'_> {
         }
     }
 
+    /// Waits, at most so long, s, until the drives' heartbeat has wrapped once since the course began.
+    pub fn wrap(&mut self, within_s: f64) -> Done {
+        let beat = |sample: &Sample| sample.word(&image::HEARTBEAT);
+        let wraps = |pair: &[Sample]| beat(&pair[1]) < beat(&pair[0]);
+        let mut left = (within_s * CYCLES_PER_S as f64) as u64 / LOOK;
+        let mut wrapped = self.course.samples.windows(2).any(wraps);
+        while !wrapped && left > 0 {
+            self.tick()?;
+            left -= 1;
+            wrapped = self
+                .course
+                .samples
+                .last_chunk::<2>()
+                .is_some_and(|pair| wraps(pair));
+        }
+        Ok(())
+    }
+
     /// Waits for a condition, at most so long, s.
     pub fn until(&mut self, text: &str, within_s: f64) -> Done {
         let condition = Condition::read(text)?;
@@ -274,6 +292,11 @@ impl Run<'_> {
         self.course.marks.push((name, self.course.samples.len()));
     }
 
+    /// What stands in a word of the simulator's own.
+    pub fn own(&self, signal: &Signal) -> u16 {
+        self.own.word(signal)
+    }
+
     /// Takes everything back that was put in, and the desk.
     fn leave(&mut self) {
         self.own = Commands::of(&Machine::news_8000());
@@ -306,24 +329,21 @@ impl Run<'_> {
         self.wait(0.2)
     }
 
-    /// From drives off to a tight web at thread speed.
+    /// From drives off to a tight web at thread speed. The web is led anew: what a fault has left slack would take
+    /// a minute to be taken up.
     pub fn tighten(&mut self) -> Done {
+        self.press(request::WEB_REMOVED)?;
+        self.until("not winder_status.web_threaded", 3.0)?;
         self.press(request::DRIVES_ON)?;
         self.until("winder_status.drives_on", 5.0)?;
-        let threaded = model_core::logic::status::WEB_THREADED;
-        if self
-            .now()
-            .is_some_and(|now| now.lacks(&image::WINDER_STATUS, threaded))
-        {
-            self.press(request::WEB_LED)?;
-            self.until("winder_status.web_threaded", 3.0)?;
-        }
+        self.press(request::WEB_LED)?;
+        self.until("winder_status.web_threaded", 3.0)?;
         self.wait(0.3)?;
         self.press(request::THREAD)?;
         self.until("winder_status.tension_detected", 30.0)?;
         // the last slack bounces
         self.wait(3.0)?;
-        self.until("winder_status.tension_detected", 10.0)?;
+        self.until("winder_status.tension_detected", 30.0)?;
         self.wait(1.0)
     }
 

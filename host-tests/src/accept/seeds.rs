@@ -197,9 +197,10 @@ pub const SEEDS: &[Seed] = &[
     Seed {
         name: "pulses-wrap",
         area: Area::Set,
-        what: "pulses are subtracted as REAL, which neither wraps nor holds them",
+        what: "the encoder's wrap is taken for that of 16 bits",
         search: "    counted := counted + UDINT_TO_DINT(pulses - last);",
-        replace: "    counted := counted + REAL_TO_DINT(UDINT_TO_REAL(pulses) - UDINT_TO_REAL(last));",
+        replace: "    IF pulses < last THEN counted := counted + 65536; END_IF;
+    counted := counted + UDINT_TO_DINT(pulses - last);",
     },
     Seed {
         name: "wrong-reset",
