@@ -172,6 +172,6 @@ pub async fn hang() -> ! {
     const AFTER: Duration = Duration::from_secs(2);
     Timer::after(AFTER).await;
     loop {
-        core::hint::spin_loop();
+        cortex_m::asm::nop();
     }
 }
