@@ -391,7 +391,7 @@ impl Page {
 pub fn button(name: &str) -> String {
     format!(
         "[...document.querySelectorAll('button, a, [role=switch]')].find((e) => \
-         (e.getAttribute('aria-label') || e.innerText || '').trim().replace(/^\\d+\\s+/, '').startsWith({}))",
+         (e.getAttribute('aria-label') || e.innerText || '').trim().replace(/^\\d\\s*\\n\\s*/, '').startsWith({}))",
         json!(name)
     )
 }
