@@ -352,7 +352,7 @@ impl<M: RawMutex> Hmi<'_, M> {
             }
             let wrong = match papers.panel.act(action, &image.feedback) {
                 Ok(()) => {
-                    papers.audit(format_args!("panel: {action:?}"));
+                    papers.audit(format_args!("panel: {action}"));
                     return Ok(());
                 }
                 Err(wrong) => wrong,

@@ -41,7 +41,7 @@ impl Bench {
             log: log.clone(),
             ..Options::default()
         };
-        let simulator = Simulator::start(Board::Host, options).expect("QEMU starts");
+        let simulator = Simulator::start(Board::Mps2, options).expect("QEMU starts");
         let link = Link::connect(simulator.address()).expect("it listens");
         let mut browser = Chromium::start(&program);
         let url = format!("http://{}/", simulator.http());

@@ -269,8 +269,12 @@ impl Page {
             "Escape" => 27,
             _ => 0,
         };
-        let text = if key == "Enter" { "\r" } else { "" };
-        for kind in ["keyDown", "keyUp"] {
+        // a key that writes nothing is a raw one: the browser itself acts on it
+        let (down, text) = match key {
+            "Enter" => ("keyDown", "\r"),
+            _ => ("rawKeyDown", ""),
+        };
+        for kind in [down, "keyUp"] {
             self.call(
                 "Input.dispatchKeyEvent",
                 json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code, "text": text }),
@@ -391,7 +395,7 @@ impl Page {
 pub fn button(name: &str) -> String {
     format!(
         "[...document.querySelectorAll('button, a, [role=switch]')].find((e) => \
-         (e.getAttribute('aria-label') || e.innerText || '').trim().replace(/^\\d+\\s+/, '').startsWith({}))",
+         (e.getAttribute('aria-label') || e.innerText || '').trim().replace(/^\\d\\s*\\n\\s*/, '').startsWith({}))",
         json!(name)
     )
 }

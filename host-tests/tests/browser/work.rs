@@ -195,15 +195,15 @@ fn a_web_break_is_put_in_by_a_click_seen_and_acknowledged() {
     bench.show("machine");
     bench
         .page
-        .until("getComputedStyle(document.querySelector('.scene .torn')).visibility === 'visible'");
+        .until("document.querySelector('.scene .torn')?.getAttribute('visibility') === 'visible'");
     bench.page.until(
         "[...document.querySelectorAll('.scene text')].some((t) => t.textContent === 'Web break')",
     );
     bench.show("faults");
     bench.page.press("All sound");
     bench.page.until_text("The machine is sound.");
-    bench.until("it stands", |feedback| {
-        feedback.word(&image::WINDER_STATUS) & status::ZERO_SPEED != 0
+    bench.until("all of it stands", |feedback| {
+        mode(feedback) == Some(Mode::Ready)
     });
     bench.page.press("Acknowledge");
     bench.until("no fault", |feedback| feedback.word(&image::FAULT) == 0);
@@ -248,6 +248,9 @@ fn a_trainee_sees_no_faults_and_leaves_with_the_password_only() {
         .until("!!document.querySelector('main.page-machine')");
     bench.page.press("Access");
     bench.page.press("Leave the trainee view");
+    bench
+        .page
+        .until("document.querySelector('dialog[open] input') !== null");
     bench.page.key("Escape");
     bench.page.until("!document.querySelector('dialog input')");
     assert_eq!(
