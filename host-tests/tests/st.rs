@@ -155,11 +155,11 @@ fn blocks_remember_and_functions_forget() {
         FUNCTION twice : INT VAR_INPUT a : INT; b : INT := 2; END_VAR VAR n : INT; END_VAR
             n := n + a; twice := n * b;
         END_FUNCTION
-        FUNCTION_BLOCK Count VAR_INPUT by : INT := 1; END_VAR VAR_OUTPUT n : INT; END_VAR
-            n := n + by;
+        FUNCTION_BLOCK Count VAR_INPUT inc : INT := 1; END_VAR VAR_OUTPUT n : INT; END_VAR
+            n := n + inc;
         END_FUNCTION_BLOCK
         FUNCTION_BLOCK Pair VAR_OUTPUT n : INT; END_VAR VAR a : Count; b : Count; END_VAR
-            a(); b(by := 10); n := a.n + b.n;
+            a(); b(inc := 10); n := a.n + b.n;
         END_FUNCTION_BLOCK
         PROGRAM p VAR one : Pair; two : Pair; x : INT; y : INT; z : INT; END_VAR
             one(); one(); two(n => y); x := one.n;

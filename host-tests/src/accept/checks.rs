@@ -356,6 +356,20 @@ fn words(c: &Course) -> Verdict {
     Ok("all words, all the time".into())
 }
 
+/// Where the course does not even come to standstill with drives off, a PLC that moves the winder does so unasked.
+fn unasked(c: &Course) -> Verdict {
+    match stays(c, "idle", "asked without drives", true) {
+        Err(Miss::NotSeen(why)) => match c.samples.iter().find(|s| on(s) || asks_to_move(s)) {
+            Some(s) => Err(c.failed(
+                format!("ON, thread or run stands, and no stop ends it: {why}"),
+                Some(s),
+            )),
+            None => Err(Miss::NotSeen(why)),
+        },
+        other => other,
+    }
+}
+
 /// 047E stands before 047F, in each drive.
 fn start_sequence(c: &Course) -> Verdict {
     let samples = c.edges_between("drives on", "in operation")?;
@@ -749,7 +763,7 @@ pub const CHECKS: &[Check] = &[
         episode: "before the start",
         trend: COMMANDED,
         causes: "outputs with a wrong initial value; a sequence that begins by itself",
-        judge: |c| stays(c, "idle", "asked without drives", true),
+        judge: unasked,
     },
     Check {
         id: "S02",

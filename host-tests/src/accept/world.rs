@@ -105,7 +105,7 @@ impl<C: Controller> World for Lockstep<C> {
         put_own(own, &mut self.commands);
         for _ in 0..LOOK {
             self.bench.step(&self.commands);
-            if self.bench.cycle % self.plc.period() == 0 {
+            if self.bench.cycle.is_multiple_of(self.plc.period()) {
                 self.plc.cycle(&self.bench.image, &mut self.commands);
                 // whatever a PLC writes there
                 put_own(own, &mut self.commands);

@@ -62,8 +62,14 @@ pub fn main(args: &Args) -> Result<ExitCode> {
         writeln!(out, "{}  {}\n     {seen}{at}", check.id, check.requirement)?;
         writeln!(out, "     likely causes: {}", check.causes)?;
     }
-    for (check, why) in outcome.not_seen() {
-        writeln!(out, "{}  not seen: {why}", check.id)?;
+    let unseen: Vec<_> = outcome.not_seen().map(|(check, _)| check.id).collect();
+    if !unseen.is_empty() {
+        writeln!(out, "not seen: {}", unseen.join(" "))?;
+    }
+    for episode in &outcome.course.episodes {
+        if let Some(why) = &episode.stuck {
+            writeln!(out, "\"{}\" did not come to its end: {why}", episode.name)?;
+        }
     }
     writeln!(out, "{}", outcome.summary())?;
     writeln!(out, "report: {}", args.out.join("accept.html").display())?;

@@ -88,13 +88,16 @@ pub(super) enum Step {
         Vec<(usize, usize)>,
     ),
     If(usize, Vec<(Code, Vec<Step>)>, Vec<Step>),
-    Case(usize, Code, Vec<(Vec<(i64, i64)>, Vec<Step>)>, Vec<Step>),
+    Case(usize, Code, Vec<Arm>, Vec<Step>),
     For(Box<Loop>),
     /// The condition is looked at before the body, or behind it.
     While(usize, bool, Code, Vec<Step>),
     Exit,
     Return,
 }
+
+/// The ranges of an arm of a `CASE`, and what is done there.
+pub(super) type Arm = (Vec<(i64, i64)>, Vec<Step>);
 
 #[derive(Clone, Debug)]
 pub(super) struct Loop {
