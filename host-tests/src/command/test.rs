@@ -13,7 +13,7 @@ type Stage = (&'static str, fn() -> Result<()>);
 
 /// Installs what is missing and runs every test there is.
 pub fn main() -> Result<ExitCode> {
-    let stages: [Stage; 7] = [
+    let stages: [Stage; 8] = [
         ("formatting", || cargo(&["fmt", "--all", "--check"])),
         ("lints", lints),
         ("host tests", || cargo(&["test"])),
@@ -45,6 +45,12 @@ pub fn main() -> Result<ExitCode> {
                 "watchdog",
             ])
         }),
+        // one at a time: each has a simulator and a browser of its own
+        ("the page in a browser", || {
+            let browser = ["--features", "qemu", "--test", "browser"];
+            let test = ["test", "--release", "-p", "host-tests"];
+            cargo(&[&test[..], &browser, &["--", "--test-threads", "1"]].concat())
+        }),
         ("fuzzing the link", super::fuzz::check),
         ("timing and sizes", || {
             super::timing::check()?;
@@ -53,6 +59,7 @@ pub fn main() -> Result<ExitCode> {
     ];
     // what needs the network first: better no start than a late stop
     setup::qemu()?;
+    setup::chromium()?;
     setup::target(TARGET)?;
     setup::target(TARGET_SOFT)?;
     let began = Instant::now();
