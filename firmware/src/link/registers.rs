@@ -148,10 +148,21 @@ pub fn concerned(place: &Place) -> Result<Range<usize>, Unfit> {
     match place {
         Place::Words(range) => Ok(range.clone()),
         Place::Halves(range) if range.start % HALVES == 0 && range.end % HALVES == 0 => {
-            Ok(range.start / HALVES..range.end / HALVES)
+            let (start, end) = (range.start / HALVES, range.end / HALVES);
+            if is_second(start) {
+                return Err(Unfit::Half);
+            }
+            // the low word of a number of two goes with its high word
+            Ok(start..end + usize::from(is_second(end)))
         }
         Place::Halves(_) => Err(Unfit::Half),
     }
+}
+
+/// The second word of a command that has two; its number stands at the first.
+fn is_second(word: usize) -> bool {
+    let before = word.checked_sub(1).and_then(|i| *COMMAND_SIGNALS.get(i)?);
+    before.is_some_and(|signal| signal.kind.words() == 2)
 }
 
 /// Registers as words: those of floats become the nearest counts within the limits.
@@ -168,6 +179,8 @@ pub fn decode(
     let mut words = heapless::Vec::new();
     let mut outside = 0;
     let mut registers = registers.take(COMMAND_WORDS * HALVES);
+    // of the number whose high word was last
+    let mut low_word = 0;
     for word in range {
         let signal = COMMAND_SIGNALS.get(word).copied().flatten();
         let (raw, limited) = match place {
@@ -175,10 +188,18 @@ pub fn decode(
                 let raw = registers.next().ok_or(Unfit::Half)?;
                 (raw, signal.is_some_and(|s| is_outside(s, raw)))
             }
+            Place::Halves(_) if is_second(word) => {
+                // what stands at its own place is nothing
+                let _ = registers.next().zip(registers.next());
+                (low_word, false)
+            }
             Place::Halves(_) => {
                 let (high, low) = registers.next().zip(registers.next()).ok_or(Unfit::Half)?;
                 let bits = u32::from(high) << 16 | u32::from(low);
-                signal.map_or(Ok((0, false)), |s| counts(s, f32::from_bits(bits)))?
+                let ([raw, low], limited) =
+                    signal.map_or(Ok(([0; 2], false)), |s| counts(s, f32::from_bits(bits)))?;
+                low_word = low;
+                (raw, limited)
             }
         };
         outside |= WordSet::from(limited) << word;
@@ -204,8 +225,8 @@ pub fn outside(commands: &Commands, words: Range<usize>) -> WordSet {
     })
 }
 
-/// The word for a float, and whether the float was outside the limits.
-fn counts(signal: &Signal, value: f32) -> Result<(u16, bool), Unfit> {
+/// The words for a float, the first one first, and whether the float was outside the limits.
+fn counts(signal: &Signal, value: f32) -> Result<([u16; 2], bool), Unfit> {
     if !value.is_finite() {
         return Err(Unfit::Value);
     }
@@ -213,19 +234,24 @@ fn counts(signal: &Signal, value: f32) -> Result<(u16, bool), Unfit> {
         // exact: the casts of a whole number within the range
         let word = value as u16;
         return if f32::from(word).to_bits() == value.to_bits() {
-            Ok((word, is_outside(signal, word)))
+            Ok(([word, 0], is_outside(signal, word)))
         } else {
             Err(Unfit::Value)
         };
     }
     let none = value == 0.0 && usize::from(signal.word) >= PLC_COMMAND_WORDS;
     if none {
-        return Ok((0, false));
+        return Ok(([0; 2], false));
     }
     let (low, high) = signal.limits;
     let mut block = Commands::default();
     block.set(signal, value);
-    Ok((block.word(signal), !(low..=high).contains(&value)))
+    let second = if signal.kind.words() == 2 {
+        block.double(signal) as u16
+    } else {
+        0
+    };
+    Ok(([block.word(signal), second], !(low..=high).contains(&value)))
 }
 
 #[cfg(test)]
@@ -303,13 +329,22 @@ mod tests {
         let mut image = image();
         for s in SIGNALS.iter().filter(|s| s.direction == Direction::Command) {
             for word in [0, 1, 2, 0x7fff, 0x8000, 0xffff] {
-                image.commands.set_word(s, word);
+                let both = [0, word];
+                let mut raw = both.as_slice();
+                if matches!(s.kind, Kind::U32) {
+                    // counts of this size stand exactly in a float
+                    image.commands.set_double(s, word.into());
+                } else {
+                    image.commands.set_word(s, word);
+                    raw = &raw[1..];
+                }
                 let r = Registers::commands(&image);
                 let written = decode(&floats_at(s), r.read(floats_at(s)));
                 let (words, outside) = written.expect("a number");
-                assert_eq!(outside != 0, is_outside(s, word), "{} {word}", s.name);
+                let out = s.kind.words() == 1 && is_outside(s, word);
+                assert_eq!(outside != 0, out, "{} {word}", s.name);
                 if outside == 0 {
-                    assert_eq!(words[..], [word], "{}", s.name);
+                    assert_eq!(words[..], *raw, "{}", s.name);
                 }
             }
         }
