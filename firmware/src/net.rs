@@ -28,10 +28,6 @@ const BUFFER_BYTES: usize = 768;
 
 /// HTTP, from the IANA registry.
 const HTTP_PORT: u16 = 80;
-/// Connections of browsers at once: each of three has a stream and some for what it asks.
-pub const HTTP_CONNECTIONS: usize = 12;
-/// One more listens, as for Modbus.
-pub const HTTP_SOCKETS: usize = HTTP_CONNECTIONS + 1;
 /// Requests are short, and what is long of them may come in parts: together with Modbus's, the windows do not overrun
 /// a receive FIFO of 10 KiB.
 const HTTP_RX_BYTES: usize = 256;
@@ -85,10 +81,7 @@ pub async fn serve_modbus<M: RawMutex>(
     }
 }
 
-/// The places of the browsers' connections.
-pub type HttpPlaces<M> = Seats<M, HTTP_CONNECTIONS>;
-
-/// What one of the HMI's sockets needs; a board has [`HTTP_SOCKETS`].
+/// What one of the HMI's sockets needs.
 pub struct HttpBuffers {
     rx: [u8; HTTP_RX_BYTES],
     tx: [u8; HTTP_TX_BYTES],
@@ -112,11 +105,11 @@ impl Default for HttpBuffers {
     }
 }
 
-/// One connection after the other: the task of one of the HMI's sockets.
-pub async fn serve_http<M: RawMutex>(
+/// One connection after the other: the task of one of the HMI's sockets. A board has one more of them than places.
+pub async fn serve_http<M: RawMutex, const N: usize>(
     stack: Stack<'_>,
     hmi: Hmi<'_, M>,
-    places: &HttpPlaces<M>,
+    places: &Seats<M, N>,
     buffers: &mut HttpBuffers,
 ) -> ! {
     let HttpBuffers { rx, tx, http } = buffers;

@@ -16,7 +16,7 @@ use crate::lan9118::Lan9118;
 const ADDRESS: Ipv4Cidr = Ipv4Cidr::new(Ipv4Address::new(10, 0, 2, 15), 24);
 const GATEWAY: Ipv4Address = Ipv4Address::new(10, 0, 2, 2);
 
-const SOCKETS: usize = net::MODBUS_SOCKETS + net::HTTP_SOCKETS;
+const SOCKETS: usize = net::MODBUS_SOCKETS + http::SOCKETS;
 
 /// What the background's tasks share: they take turns, so a lock need not keep anything off.
 pub type LocalService = Service<'static, NoopRawMutex>;

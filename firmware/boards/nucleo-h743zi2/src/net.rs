@@ -31,7 +31,7 @@ bind_interrupts!(struct Irqs {
 type Device = Ethernet<'static, ETH, GenericPhy<Sma<'static, ETH_SMA>>>;
 
 /// With that of DHCP.
-const SOCKETS: usize = net::MODBUS_SOCKETS + net::HTTP_SOCKETS + 1;
+const SOCKETS: usize = net::MODBUS_SOCKETS + http::SOCKETS + 1;
 /// What the background's tasks share: they take turns, so a lock need not keep anything off.
 pub type LocalService = Service<'static, NoopRawMutex>;
 
