@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 
 use super::timing::tell;
 use crate::setup::{self, Warnings};
@@ -19,13 +19,11 @@ pub struct Args {
 /// The table that is kept.
 const TABLE: &str = "sizes.md";
 
-/// Fails where they are not as kept.
+/// Fails where a chip is too small. A difference from what is kept is shown, but does not fail: names of directories
+/// are in the images, and their lengths are not the same everywhere.
 pub fn check() -> Result<()> {
-    let outcome = main(Args { bless: false })?;
-    ensure!(
-        outcome == ExitCode::SUCCESS,
-        "the firmware's sizes are not as kept, see above"
-    );
+    let table = golden::with_compiler(&setup::compiler()?, &sizes::table(Warnings::Denied)?);
+    tell(&golden::compare(TABLE, &table)?, "cargo winder size");
     Ok(())
 }
 
