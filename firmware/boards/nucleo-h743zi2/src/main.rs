@@ -28,6 +28,7 @@ mod http;
 mod memory;
 mod net;
 mod panel;
+mod serial;
 mod settings;
 mod simulator;
 mod watchdog;
@@ -41,7 +42,7 @@ use embassy_stm32::gpio::{Input, Pull};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_time::{Duration, Instant};
-use firmware::store::Network;
+use firmware::store::{Network, Serial};
 use model_core::machine::Machine;
 use model_core::restart::Restart;
 use panel::Panel;
@@ -133,13 +134,30 @@ fn main() -> ! {
         rng: p.RNG,
     };
 
+    let line = serial::Resources {
+        usart: p.USART2,
+        pins: (p.PD6, p.PD5, p.PD4),
+    };
+
     let start = Instant::now() + SETTLING;
     let timed = [PLANT.start(interrupt::UART7), DRIVE.start(interrupt::UART8)];
     timed[0].spawn(watchdog::run(p.IWDG1).expect("first"));
     let exchange = simulator::start(timed, start, machine, wires, started);
     let background = BACKGROUND.start(interrupt::SAI1);
     background.spawn(
-        all_else(machine, exchange, panel, ethernet, settings.network, reset).expect("first"),
+        all_else(
+            machine,
+            exchange,
+            Given {
+                panel,
+                ethernet,
+                network: settings.network,
+                line,
+                serial: settings.serial,
+                reset,
+            },
+        )
+        .expect("first"),
     );
 
     loop {
@@ -147,21 +165,25 @@ fn main() -> ! {
     }
 }
 
-/// Everything that may wait: logic, panel, network.
-#[embassy_executor::task]
-async fn all_else(
-    machine: &'static Machine,
-    exchange: &'static Exchange,
+/// What the background gets of chip and settings.
+struct Given {
     panel: Panel,
     ethernet: net::Resources,
     network: Network,
+    line: serial::Resources,
+    serial: Serial,
     reset: &'static str,
-) {
+}
+
+/// Everything that may wait: logic, panel, serial line, network.
+#[embassy_executor::task]
+async fn all_else(machine: &'static Machine, exchange: &'static Exchange, given: Given) {
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     let service = simulator::service(machine);
-    let desk = simulator::desk(machine, reset);
+    let desk = simulator::desk(machine, given.reset);
     spawner.spawn(simulator::logic(machine, exchange, service, desk).expect("first"));
-    spawner.spawn(panel::run(panel, exchange).expect("first"));
-    net::start(spawner, ethernet, network, service, desk);
+    spawner.spawn(panel::run(given.panel, exchange, service).expect("first"));
+    serial::start(spawner, given.line, given.serial, service);
+    net::start(spawner, given.ethernet, given.network, service, desk);
 }

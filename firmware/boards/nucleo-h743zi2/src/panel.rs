@@ -4,7 +4,9 @@ use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::peripherals::{PB0, PB14, PE1};
 use embassy_time::Timer;
+use model_core::image;
 
+use crate::net::LocalService;
 use crate::simulator::Exchange;
 
 /// Period of the panel, ms: as quick as an eye.
@@ -36,8 +38,8 @@ impl Panel {
 
 /// Shows, as long as the firmware lives.
 #[embassy_executor::task]
-pub async fn run(mut panel: Panel, exchange: &'static Exchange) -> ! {
-    let mut beat = 0_u32;
+pub async fn run(mut panel: Panel, exchange: &'static Exchange, service: LocalService) -> ! {
+    let (mut beat, mut asked) = (0_u32, 0);
     loop {
         Timer::after_millis(PERIOD_MS).await;
         beat = beat.wrapping_add(1);
@@ -45,6 +47,10 @@ pub async fn run(mut panel: Panel, exchange: &'static Exchange) -> ! {
             .green
             .set_level((beat / BLINK).is_multiple_of(2).into());
         panel.red.set_level(exchange.outputs().fault.into());
-        panel.yellow.set_low();
+        let requests = service
+            .image
+            .lock(|image| image.borrow().feedback.double(&image::LINK_REQUESTS));
+        panel.yellow.set_level((requests != asked).into());
+        asked = requests;
     }
 }
