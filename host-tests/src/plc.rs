@@ -24,21 +24,6 @@ use model_core::simulator::Simulator;
 use crate::interrupt;
 use crate::link::Link;
 
-/// Control word 1 of every drive.
-const STW1: [&Signal; 4] = [
-    &image::STW1_UW,
-    &image::STW1_RD,
-    &image::STW1_FD,
-    &image::STW1_RR,
-];
-/// Status word 1 of every drive.
-const ZSW1: [&Signal; 4] = [
-    &image::ZSW1_UW,
-    &image::ZSW1_RD,
-    &image::ZSW1_FD,
-    &image::ZSW1_RR,
-];
-
 /// Time of a program cycle, s of simulated time; usual for a winder PLC.
 pub const CYCLE_S: f64 = 0.040;
 /// A step stands at least this long, s: its commands have arrived and their effect is in the feedback.
@@ -287,7 +272,7 @@ impl fmt::Display for Trouble {
             };
             write!(f, "{} {word}: {text}; ", signal.name)?;
         }
-        for signal in ZSW1 {
+        for signal in image::ZSW1 {
             write!(f, "{} {:04X} hex, ", signal.name, s.feedback.word(signal))?;
         }
         write!(f, "{}", image::WINDER_STATUS.name)?;
@@ -379,7 +364,7 @@ impl Plc {
         self.commands.set_word(&image::HEARTBEAT_PLC, heartbeat);
         self.commands
             .set_word(&image::WINDER_COMMAND, self.step.winder_command());
-        for word in STW1 {
+        for word in image::STW1 {
             self.commands.set_word(word, self.step.stw1());
         }
         Ok(sample)
@@ -389,7 +374,8 @@ impl Plc {
     fn finished(&self, sample: &Sample) -> bool {
         let is = |bits| sample.feedback.word(&image::WINDER_STATUS) & bits == bits;
         let drives = |bits| {
-            ZSW1.iter()
+            image::ZSW1
+                .iter()
                 .all(|zsw1| sample.feedback.word(zsw1) & bits == bits)
         };
         let near = |signal, value_mm: f64| (sample.value(signal) - value_mm).abs() < 1.0;

@@ -209,6 +209,11 @@ signals! {
     RESTARTS:         Feedback 96, Simulator, U16, "", 1.0, 0.0 ..= 65535.0, "Starts by itself since power came";
 }
 
+/// Control word 1 of every section.
+pub const STW1: [&Signal; 4] = [&STW1_UW, &STW1_RD, &STW1_FD, &STW1_RR];
+/// Status word 1 of every section.
+pub const ZSW1: [&Signal; 4] = [&ZSW1_UW, &ZSW1_RD, &ZSW1_FD, &ZSW1_RR];
+
 /// Jog speed at power-up, m/min.
 const JOG_M_MIN: f32 = 15.0;
 /// Heartbeat time at power-up, ms: a dozen cycles of a slow PLC.

@@ -465,12 +465,7 @@ pub fn commands(machine: &Machine, cycle: u32) -> Commands {
     commands.set_word(&image::HEARTBEAT_PLC, cycle as u16);
     commands.set_word(&image::WINDER_COMMAND, word);
     commands.set(&image::V_SET, PLC_SPEED);
-    for signal in [
-        &image::STW1_UW,
-        &image::STW1_RD,
-        &image::STW1_FD,
-        &image::STW1_RR,
-    ] {
+    for signal in image::STW1 {
         commands.set_word(signal, drives);
     }
     commands

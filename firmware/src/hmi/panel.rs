@@ -12,26 +12,11 @@ use core::fmt;
 use heapless::Vec;
 use model_core::drive::DRIVE_PERIOD_MS;
 use model_core::exchange::TuneStep;
-use model_core::image::{self, Commands, Feedback, Signal};
+use model_core::image::{self, Commands, Feedback};
 use model_core::logic::{Fault, LOOPS, Mode, Refusal, command, status};
 use model_core::machine::Machine;
 use model_core::profidrive::{stw1, zsw1};
 use model_core::real::Real;
-
-/// Control word 1 of every drive.
-const STW1: [&Signal; 4] = [
-    &image::STW1_UW,
-    &image::STW1_RD,
-    &image::STW1_FD,
-    &image::STW1_RR,
-];
-/// Status word 1 of every drive.
-const ZSW1: [&Signal; 4] = [
-    &image::ZSW1_UW,
-    &image::ZSW1_RD,
-    &image::ZSW1_FD,
-    &image::ZSW1_RR,
-];
 
 /// Drive cycles of a time.
 const fn cycles(ms: u32) -> u32 {
@@ -502,7 +487,7 @@ impl Panel {
         let beat = commands.word(&image::HEARTBEAT_PLC).wrapping_add(1);
         commands.set_word(&image::HEARTBEAT_PLC, beat);
         commands.set_word(&image::WINDER_COMMAND, self.word);
-        for signal in STW1 {
+        for signal in image::STW1 {
             commands.set_word(signal, self.stw1);
         }
         commands.set_word(&image::AUTOTUNE_LOOP, self.tune);
@@ -592,7 +577,11 @@ impl Panel {
     /// Has the step reached its end?
     fn finished(&self, step: Step, feedback: &Feedback, commands: &Commands) -> bool {
         let is = |bits| is(feedback, bits);
-        let drives = |bits| ZSW1.iter().all(|zsw1| feedback.word(zsw1) & bits == bits);
+        let drives = |bits| {
+            image::ZSW1
+                .iter()
+                .all(|zsw1| feedback.word(zsw1) & bits == bits)
+        };
         let near = |signal, mm: f32| (feedback.get::<f32>(signal) - mm).abs() < NEAR_MM;
         let mode = mode(feedback);
         let stands =

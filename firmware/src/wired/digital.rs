@@ -42,12 +42,7 @@ impl Inputs {
             commands.set_word(signal, if set { word | bits } else { word & !bits });
         };
         if !self.emergency_stop_closed {
-            for word in [
-                &image::STW1_UW,
-                &image::STW1_RD,
-                &image::STW1_FD,
-                &image::STW1_RR,
-            ] {
+            for word in image::STW1 {
                 put(word, stw1::NO_QUICK_STOP, false);
             }
         }

@@ -81,21 +81,6 @@ pub struct Check {
     pub judge: fn(&Course) -> Verdict,
 }
 
-/// Control word 1 of every drive.
-const STW1: [&Signal; 4] = [
-    &image::STW1_UW,
-    &image::STW1_RD,
-    &image::STW1_FD,
-    &image::STW1_RR,
-];
-/// Status word 1 of every drive.
-const ZSW1: [&Signal; 4] = [
-    &image::ZSW1_UW,
-    &image::ZSW1_RD,
-    &image::ZSW1_FD,
-    &image::ZSW1_RR,
-];
-
 /// What a PLC may take to see and to act, s: two polls and two cycles of a slow one.
 const REACTION_S: f64 = 0.5;
 /// The same for an emergency stop.
@@ -249,7 +234,7 @@ fn asks_to_move(s: &Sample) -> bool {
 }
 
 fn on(s: &Sample) -> bool {
-    STW1.iter().any(|word| s.has(word, stw1::ON))
+    image::STW1.iter().any(|word| s.has(word, stw1::ON))
 }
 
 fn off(s: &Sample) -> bool {
@@ -374,7 +359,7 @@ fn unasked(c: &Course) -> Verdict {
 fn start_sequence(c: &Course) -> Verdict {
     let samples = c.edges_between("drives on", "in operation")?;
     let mut told = Vec::new();
-    for (stw, zsw) in STW1.into_iter().zip(ZSW1) {
+    for (stw, zsw) in image::STW1.into_iter().zip(image::ZSW1) {
         let first = samples.iter().position(|s| s.has(stw, stw1::ON));
         let Some(first) = first else {
             return Err(c.failed(format!("{}: ON is not given", stw.name), samples.first()));
@@ -466,7 +451,7 @@ fn acknowledge(c: &Course) -> Verdict {
                 continue;
             }
         };
-        let words = STW1.iter().map(|word| (*word, stw1::ACKNOWLEDGE));
+        let words = image::STW1.iter().map(|word| (*word, stw1::ACKNOWLEDGE));
         for (signal, bit) in words.chain([(&WINDER_COMMAND, command::ACKNOWLEDGE)]) {
             if let Some((_, at)) = edges(samples, signal, bit).next() {
                 let text = format!(
@@ -502,7 +487,7 @@ fn false_alarms(c: &Course) -> Verdict {
 
 /// ON is given only to a drive that is ready for it.
 fn only_when_ready(c: &Course) -> Verdict {
-    for (stw, zsw) in STW1.into_iter().zip(ZSW1) {
+    for (stw, zsw) in image::STW1.into_iter().zip(image::ZSW1) {
         for (before, at) in edges(&c.samples, stw, stw1::ON) {
             let silent = at.value(&image::FAULT_DRIVES) as u16 >> 10 & 1 == 1;
             if !silent && !before.has(zsw, zsw1::READY_TO_SWITCH_ON) {
@@ -516,7 +501,7 @@ fn only_when_ready(c: &Course) -> Verdict {
             }
         }
     }
-    let given: usize = STW1
+    let given: usize = image::STW1
         .iter()
         .map(|w| edges(&c.samples, w, stw1::ON).count())
         .sum();
@@ -594,7 +579,11 @@ fn stop(c: &Course) -> Verdict {
 
 fn emergency(c: &Course) -> Verdict {
     let samples = c.after("emergency stop", 2.0)?;
-    let quick = |s: &Sample| STW1.iter().all(|word| s.lacks(word, stw1::NO_QUICK_STOP));
+    let quick = |s: &Sample| {
+        image::STW1
+            .iter()
+            .all(|word| s.lacks(word, stw1::NO_QUICK_STOP))
+    };
     c.soon(samples, EMERGENCY_S, "OFF3 in all four words", quick)
 }
 

@@ -2,24 +2,17 @@
 
 use crate::operator::{CYCLE, Operator};
 use crate::{RUN, TENSION, near, put, running_at, stalled, threaded};
-use model_core::image::{self, Signal};
+use model_core::image;
 use model_core::logic::faults::{FAULTS, Reaction};
 use model_core::logic::{Fault, Mode, Refusal, command, inject, status, warning};
 use model_core::profidrive::{stw1, zsw1};
-
-const ZSW1: [&Signal; 4] = [
-    &image::ZSW1_UW,
-    &image::ZSW1_RD,
-    &image::ZSW1_FD,
-    &image::ZSW1_RR,
-];
 
 /// Run speed, m/min.
 const FULL_SPEED: f64 = 2200.0;
 
 /// A bit of status word 1, of unwind, rear drum, front drum and rider roll.
 fn zsw1_bit(o: &Operator<f32>, bit: u16) -> [bool; 4] {
-    ZSW1.map(|signal| o.image.feedback.word(signal) & bit != 0)
+    image::ZSW1.map(|signal| o.image.feedback.word(signal) & bit != 0)
 }
 
 /// The sections that the table of faults names.

@@ -62,12 +62,7 @@ fn meddle(commands: &mut Commands, chance: &mut Chance, beats: bool) {
         let beat = commands.word(&image::HEARTBEAT_PLC);
         commands.set_word(&image::HEARTBEAT_PLC, beat.wrapping_add(1));
     }
-    let words = [
-        &image::STW1_UW,
-        &image::STW1_RD,
-        &image::STW1_FD,
-        &image::STW1_RR,
-    ];
+    let words = image::STW1;
     match chance.below(60) {
         0 | 1 => words
             .iter()

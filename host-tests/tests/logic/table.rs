@@ -105,12 +105,7 @@ fn every_stop_of_every_section_stops_the_winder() {
     ];
     for (mode, by_off1, by_off2, by_off3) in rows {
         let start = in_mode(mode);
-        for section in [
-            &image::STW1_UW,
-            &image::STW1_RD,
-            &image::STW1_FD,
-            &image::STW1_RR,
-        ] {
+        for section in image::STW1 {
             for (word, expected) in [
                 (off1, by_off1),
                 (off2, by_off2),

@@ -108,12 +108,7 @@ impl<R: Float> Operator<R> {
 
     /// Sets control word 1 of all drives.
     pub fn drives(&mut self, word: u16) {
-        for signal in [
-            &image::STW1_UW,
-            &image::STW1_RD,
-            &image::STW1_FD,
-            &image::STW1_RR,
-        ] {
+        for signal in image::STW1 {
             self.image.commands.set_word(signal, word);
         }
     }
