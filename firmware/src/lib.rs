@@ -8,6 +8,7 @@
 extern crate std;
 
 pub mod attendant;
+mod hash;
 pub mod hmi;
 pub mod journal;
 pub mod life;

@@ -4,12 +4,16 @@
 //! the link's session and the HMI's. There is no IPv6 and no queue of connections: with every socket busy the next
 //! client is refused.
 
+use embassy_futures::join::join;
+use embassy_net::driver::Driver;
 use embassy_net::tcp::TcpSocket;
-use embassy_net::{ConfigV4, IpAddress, Ipv4Address, Ipv4Cidr, Stack, StaticConfigV4};
+use embassy_net::{ConfigV4, IpAddress, Ipv4Address, Ipv4Cidr, Runner, Stack, StaticConfigV4};
 use embassy_sync::blocking_mutex::raw::RawMutex;
-use embassy_time::{Duration, with_timeout};
+use embassy_time::{Duration, Instant, Timer, with_timeout};
 
+use crate::hash::fnv1a;
 use crate::hmi::{self, Hmi};
+use crate::life::{Life, PATIENCE, Task};
 use crate::link::Service;
 use crate::link::control::{Peer, Protocol};
 use crate::link::modbus::tcp::{End, Timeouts, session};
@@ -126,6 +130,24 @@ pub async fn serve_http<M: RawMutex, const N: usize>(
             let _ = place.hold(session).await;
         }
     }
+}
+
+/// The stack's own task, which shows that it lives.
+pub async fn run<D: Driver>(mut runner: Runner<'_, D>, life: &Life) -> ! {
+    let lives = async {
+        loop {
+            life.see(Task::Network, Instant::now());
+            Timer::after(PATIENCE / 2).await;
+        }
+    };
+    join(runner.run(), lives).await.0
+}
+
+/// A hardware address out of a chip's own number, in the range that everybody may use (IEEE 802, locally
+/// administered).
+pub fn hardware_address(chip: &[u8]) -> [u8; 6] {
+    let [a, b, c, d] = fnv1a(chip.iter().copied()).to_be_bytes();
+    [0x02, 0x57, a, b, c, d]
 }
 
 /// What the stack is configured with.

@@ -9,6 +9,8 @@ use heapless::Vec;
 use model_core::machine::{Machine, MachineError, Value, parameters};
 use serde::{Deserialize, Serialize};
 
+use crate::hash::fnv1a;
+
 /// The most parameters that a machine can have, with room for some more.
 const PARAMETERS_MAX: usize = 256;
 /// The longest encoded settings, in bytes: a hash of up to 5 and a number of 8 for each parameter, and the rest.
@@ -197,11 +199,8 @@ impl Settings {
     }
 }
 
-/// FNV-1a. Source: Fowler, Noll, Vo, draft-eastlake-fnv, 32 bits.
 fn hash(name: &str) -> u32 {
-    name.bytes().fold(0x811c_9dc5, |hash, byte| {
-        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-    })
+    fnv1a(name.bytes())
 }
 
 #[cfg(test)]

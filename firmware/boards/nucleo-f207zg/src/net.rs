@@ -4,7 +4,6 @@
 //! address comes when the cable does.
 
 use embassy_executor::Spawner;
-use embassy_futures::join::join;
 use embassy_net::{Config, Runner, Stack, StackResources};
 use embassy_stm32::eth::{self, Ethernet, GenericPhy, PacketQueue, Sma};
 use embassy_stm32::peripherals::{
@@ -13,8 +12,6 @@ use embassy_stm32::peripherals::{
 use embassy_stm32::rng::{self, Rng};
 use embassy_stm32::{Peri, bind_interrupts, uid};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
-use embassy_time::{Instant, Timer};
-use firmware::life::{PATIENCE, Task};
 use firmware::link::Service;
 use firmware::net::{self, Places};
 use firmware::store::Network;
@@ -77,7 +74,7 @@ pub fn start(spawner: Spawner, r: Resources, service: LocalService) {
         r.tx.0,
         r.tx.1,
         r.tx.2,
-        hardware_address(),
+        net::hardware_address(&uid::uid()),
         r.sma.0,
         r.sma.1,
         r.sma.2,
@@ -95,26 +92,9 @@ pub fn start(spawner: Spawner, r: Resources, service: LocalService) {
     }
 }
 
-/// Of the chip's own number, in the range that everybody may use (IEEE 802, locally administered).
-fn hardware_address() -> [u8; 6] {
-    // FNV-1a. Source: Fowler, Noll, Vo, draft-eastlake-fnv, 32 bits.
-    let hash = uid::uid().iter().fold(0x811c_9dc5_u32, |hash, byte| {
-        (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193)
-    });
-    let [a, b, c, d] = hash.to_be_bytes();
-    [0x02, 0x57, a, b, c, d]
-}
-
-/// The stack's own task, which shows that it lives.
 #[embassy_executor::task]
-async fn run(mut runner: Runner<'static, Device>) -> ! {
-    let lives = async {
-        loop {
-            watchdog::LIFE.see(Task::Network, Instant::now());
-            Timer::after(PATIENCE / 2).await;
-        }
-    };
-    join(runner.run(), lives).await.0
+async fn run(runner: Runner<'static, Device>) -> ! {
+    net::run(runner, &watchdog::LIFE).await
 }
 
 #[embassy_executor::task]
