@@ -180,6 +180,11 @@ pub fn chromium() -> Result<PathBuf> {
     installed(&BROWSERS, "Chromium", "Chromium (120 or later)")
 }
 
+/// A Modbus client of others, which asks by libmodbus; installed with apt where it is missing.
+pub fn mbpoll() -> Result<PathBuf> {
+    installed(&["mbpoll"], "mbpoll", "mbpoll")
+}
+
 /// A program by any of its names; where there is none, the Debian package of the first name is installed.
 fn installed(names: &[&str], what: &str, by_hand: &str) -> Result<PathBuf> {
     let present = || names.iter().find_map(|name| on_path(name));

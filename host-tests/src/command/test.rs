@@ -60,6 +60,7 @@ pub fn main() -> Result<ExitCode> {
     // what needs the network first: better no start than a late stop
     setup::qemu()?;
     setup::chromium()?;
+    setup::mbpoll()?;
     setup::target(TARGET)?;
     setup::target(TARGET_SOFT)?;
     let began = Instant::now();
