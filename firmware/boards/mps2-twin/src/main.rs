@@ -18,6 +18,8 @@ mod count;
 mod marks;
 mod system;
 
+// How memory is copied.
+use board_copy as _;
 use cortex_m_semihosting::{debug, hprintln};
 use model_core::fixed::Word;
 use model_core::real::Scalar;

@@ -26,6 +26,8 @@ mod trace;
 mod uart_log;
 mod watchdog;
 
+// How memory is copied.
+use board_copy as _;
 use embassy_executor::InterruptExecutor;
 use embassy_time::{Duration, Instant};
 use firmware::life::Task;

@@ -25,6 +25,8 @@ mod watchdog;
 use core::panic::PanicInfo;
 
 use cortex_m::peripheral::SCB;
+// How memory is copied.
+use board_copy as _;
 // The log: its way out.
 use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;

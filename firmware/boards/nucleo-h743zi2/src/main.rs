@@ -34,6 +34,8 @@ mod simulator;
 mod watchdog;
 mod wires;
 
+// How memory is copied.
+use board_copy as _;
 // The log: its way out.
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
