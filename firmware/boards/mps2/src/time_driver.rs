@@ -38,102 +38,73 @@ mod device {
     use super::Register;
 
     // SAFETY (all): registers of timers and FPGAIO, which access no memory.
-    pub const TIMER0: Simple = unsafe { Simple::at(0x4000_0000) };
-    pub const TIMER1: Simple = unsafe { Simple::at(0x4000_1000) };
-    pub const DUAL: Dual = unsafe { Dual::at(0x4000_2000) };
+    pub const TIMER0: Alarm = unsafe { Alarm::simple(0x4000_0000) };
+    pub const TIMER1: Alarm = unsafe { Alarm::simple(0x4000_1000) };
+    pub const DUAL: Alarm = unsafe { Alarm::dual(0x4000_2000) };
     pub const FPGAIO_COUNTER: Register = unsafe { Register::at(0x4002_8018) };
     pub const FPGAIO_PRESCALE: Register = unsafe { Register::at(0x4002_801c) };
     /// Counts down from PRESCALE to 0 in each tick.
     pub const FPGAIO_PSCNTR: Register = unsafe { Register::at(0x4002_8020) };
 
-    /// A one-shot timer.
+    /// A one-shot timer, and how it runs once for each time that it is set.
     #[derive(Clone, Copy)]
-    pub enum Alarm {
-        Simple(Simple),
-        Dual(Dual),
-    }
-
-    /// A simple timer: not reloading makes it a one-shot.
-    #[derive(Clone, Copy)]
-    pub struct Simple {
-        ctrl: Register,
-        value: Register,
-        reload: Register,
-        intclear: Register,
-    }
-
-    /// The first counter of the dual timer.
-    #[derive(Clone, Copy)]
-    pub struct Dual {
-        load: Register,
+    pub struct Alarm {
+        count: Register,
         ctrl: Register,
         intclear: Register,
-    }
-
-    impl Simple {
-        /// # Safety
-        /// A simple timer must be at the address.
-        const unsafe fn at(base: usize) -> Self {
-            // SAFETY: promised by the caller.
-            unsafe {
-                Self {
-                    ctrl: Register::at(base),
-                    value: Register::at(base + 4),
-                    reload: Register::at(base + 8),
-                    intclear: Register::at(base + 0xc),
-                }
-            }
-        }
-    }
-
-    impl Dual {
-        /// # Safety
-        /// A dual timer must be at the address.
-        const unsafe fn at(base: usize) -> Self {
-            // SAFETY: promised by the caller.
-            unsafe {
-                Self {
-                    load: Register::at(base),
-                    ctrl: Register::at(base + 8),
-                    intclear: Register::at(base + 0xc),
-                }
-            }
-        }
+        one_shot: u32,
     }
 
     impl Alarm {
-        /// Sets it for the first time, and lets it run.
-        pub fn start(self, cycles: u32) {
-            match self {
-                Self::Simple(timer) => {
-                    const ENABLE_WITH_INTERRUPT: u32 = 1 << 3 | 1 << 0;
-                    timer.reload.write(0);
-                    self.set(cycles);
-                    timer.ctrl.write(ENABLE_WITH_INTERRUPT);
-                }
-                Self::Dual(timer) => {
-                    /// Enabled, loading anew, with interrupt, 32 bits wide, one-shot: so it runs once for each load.
-                    const ONE_SHOT: u32 = 1 << 7 | 1 << 6 | 1 << 5 | 1 << 1 | 1 << 0;
-                    timer.load.write(cycles);
-                    timer.ctrl.write(ONE_SHOT);
+        /// A simple timer: that it does not load anew makes it a one-shot.
+        ///
+        /// # Safety
+        /// A simple timer must be at the address.
+        const unsafe fn simple(base: usize) -> Self {
+            const ENABLE_WITH_INTERRUPT: u32 = 1 << 3 | 1 << 0;
+            // SAFETY: promised by the caller. RELOAD is 0 after reset and stays so.
+            unsafe {
+                Self {
+                    count: Register::at(base + 4),
+                    ctrl: Register::at(base),
+                    intclear: Register::at(base + 0xc),
+                    one_shot: ENABLE_WITH_INTERRUPT,
                 }
             }
+        }
+
+        /// The first counter of a dual timer.
+        ///
+        /// # Safety
+        /// A dual timer must be at the address.
+        const unsafe fn dual(base: usize) -> Self {
+            /// Enabled, loading anew, with interrupt, 32 bits wide, one-shot: so it runs once for each load.
+            const ONE_SHOT: u32 = 1 << 7 | 1 << 6 | 1 << 5 | 1 << 1 | 1 << 0;
+            // SAFETY: promised by the caller.
+            unsafe {
+                Self {
+                    count: Register::at(base),
+                    ctrl: Register::at(base + 8),
+                    intclear: Register::at(base + 0xc),
+                    one_shot: ONE_SHOT,
+                }
+            }
+        }
+
+        /// Sets it for the first time, and lets it run.
+        pub fn start(self, cycles: u32) {
+            self.set(cycles);
+            self.ctrl.write(self.one_shot);
         }
 
         /// Goes off after so many clock cycles, and not when it was to before.
         pub fn set(self, cycles: u32) {
-            match self {
-                Self::Simple(timer) => timer.value.write(cycles),
-                Self::Dual(timer) => timer.load.write(cycles),
-            }
+            self.count.write(cycles);
         }
 
         /// It has been heard.
         pub fn clear(self) {
-            match self {
-                Self::Simple(timer) => timer.intclear.write(1),
-                Self::Dual(timer) => timer.intclear.write(1),
-            }
+            self.intclear.write(1);
         }
     }
 }
@@ -143,6 +114,8 @@ struct Level {
     alarm: device::Alarm,
     /// The time when the counter was read last.
     last: Cell<u64>,
+    /// When the alarm goes off.
+    armed: Cell<u64>,
     queue: RefCell<Queue>,
 }
 
@@ -151,6 +124,7 @@ impl Level {
         Self {
             alarm,
             last: Cell::new(0),
+            armed: Cell::new(0),
             queue: RefCell::new(Queue::new()),
         }
     }
@@ -164,21 +138,31 @@ impl Level {
         now
     }
 
-    /// Wakes what is due, and gives the clock cycles to the next.
-    fn wait(&self) -> u32 {
+    /// Sets the alarm to a time, or so late as it reaches, and gives the clock cycles to it.
+    fn arm(&self, at: impl FnOnce(u64) -> u64) -> u32 {
         // Before the clock: if a tick ends in between, the alarm comes early and is set anew, never late.
         let rest_of_tick = device::FPGAIO_PSCNTR.read();
         let now = self.now();
-        let next = self.queue.borrow_mut().next_expiration(now);
-        // `next` is later than `now`: what was due is out of the queue.
-        let ticks = (next - now).min(LONGEST_ALARM) as u32;
+        let at = at(now);
+        let ticks = if at > now {
+            (at - now).min(LONGEST_ALARM) as u32
+        } else {
+            1
+        };
+        self.armed.set(now + u64::from(ticks));
         (ticks - 1) * CYCLES_PER_TICK + rest_of_tick + 1
+    }
+
+    /// Wakes what is due, and arms the alarm for the next.
+    fn wake_due(&self) -> u32 {
+        self.arm(|now| self.queue.borrow_mut().next_expiration(now))
     }
 
     fn schedule(&self, at: u64, waker: &Waker) {
         let changed = self.queue.borrow_mut().schedule_wake(at, waker);
-        if changed {
-            self.alarm.set(self.wait());
+        // Whatever else waits does so at least until the alarm that is armed.
+        if changed && at < self.armed.get() {
+            self.alarm.set(self.arm(|_| at));
         }
     }
 
@@ -186,7 +170,7 @@ impl Level {
     fn serve(&self) {
         // Before arming anew: an alarm that goes off from then on is the new one's.
         self.alarm.clear();
-        self.alarm.set(self.wait());
+        self.alarm.set(self.wake_due());
     }
 }
 
@@ -202,9 +186,9 @@ struct Clock {
 unsafe impl Sync for Clock {}
 
 embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock {
-    plant: Level::new(device::Alarm::Simple(device::TIMER0)),
-    drive: Level::new(device::Alarm::Simple(device::TIMER1)),
-    background: Level::new(device::Alarm::Dual(device::DUAL)),
+    plant: Level::new(device::TIMER0),
+    drive: Level::new(device::TIMER1),
+    background: Level::new(device::DUAL),
 });
 
 impl Clock {
@@ -243,7 +227,7 @@ pub fn start() {
     device::FPGAIO_PRESCALE.write(CYCLES_PER_TICK - 1);
     device::FPGAIO_COUNTER.write(0);
     for level in [&CLOCK.plant, &CLOCK.drive, &CLOCK.background] {
-        level.alarm.start(level.wait());
+        level.alarm.start(level.wake_due());
     }
     interrupts::enable(Interrupt::AlarmPlant);
     interrupts::enable(Interrupt::AlarmDrive);
