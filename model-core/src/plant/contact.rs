@@ -253,6 +253,24 @@ impl<R: Real> Contact<R> {
         }
     }
 
+    /// How a brake holds the windup over a step, where it is one body at speed `v`.
+    pub fn hold_whole(
+        &self,
+        v: R,
+        roll: &ShippingRoll<R>,
+        t_sr: R,
+        drive: &[R; ROLLS],
+        brake: &Brake<R>,
+    ) -> Friction<R> {
+        let speeds = Speeds {
+            rolls: [v; ROLLS],
+            wu: v,
+        };
+        let forces = self.forces(&speeds, roll, t_sr, drive);
+        let body = self.body(&forces, roll, &[Nip::Sticks; ROLLS]);
+        brake.hold(body.mass, v, body.force)
+    }
+
     /// F_j = clamp(m·\[(V_j − V_wu)/h + f_j/m_j − f_wu/m_wu\], ±μ·N·W) of the sliding nips one after the other, with
     /// the reduced mass m: each takes relative speed away and can never turn it over. Tells which end their slip.
     fn catch(

@@ -435,10 +435,18 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
             threaded: self.threaded,
             offsets: offsets.as_ref(),
         };
-        if self.holders.winds() || self.closed.rd || self.closed.fd {
-            self.turn_held_windup(&actuators.torque, &load);
+        if self.holders.winds() {
+            self.turn_wound_windup(&actuators.torque, &load);
         } else {
-            self.turn_windup(self.whole(&actuators.torque), &load);
+            let drums = if self.closed.rd || self.closed.fd {
+                self.hold_drums(&actuators.torque, layer)
+            } else {
+                Friction::NONE
+            };
+            self.turn_windup(self.whole(&actuators.torque, drums.lambda), &load);
+            if drums.sticks {
+                self.state.v[SPANS - 1] = R::Sum::at(R::ZERO);
+            }
         }
         if unwind.sticks {
             self.state.omega_uw = R::Sum::at(R::ZERO);
@@ -470,16 +478,17 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         self.travel += v_rd.to_si(self.scale.speed) * self.step;
     }
 
-    /// What drives the windup as one body.
-    fn whole(&self, torque: &BySection<R::Si>) -> Whole<R> {
+    /// What drives the windup as one body: its motors less its brakes' friction, N.
+    fn whole(&self, torque: &BySection<R::Si>, friction: R::Si) -> Whole<R> {
         let torque = [torque.rd, torque.fd, torque.rr];
         let torque = torque.map(|torque| R::of_si(torque, self.scale.torque_rolls));
-        Whole(self.motion.windup.pull(torque))
+        let friction = R::of_si(friction, self.scale.force);
+        Whole(self.motion.windup.pull(torque) - friction)
     }
 
-    /// Moves everything, the windup with its brakes and nips. Not inlined: the step without them is shorter so.
+    /// Moves everything, the windup with its nips and brakes. Not inlined: the step without nips is shorter so.
     #[inline(never)]
-    fn turn_held_windup(&mut self, torque: &BySection<R::Si>, load: &Load<R, (), SPANS>) {
+    fn turn_wound_windup(&mut self, torque: &BySection<R::Si>, load: &Load<R, (), SPANS>) {
         let x = self.state();
         let traction = self.load_nips(x.r_wu);
         let layer = load.layer.to_si(self.scale.one);
@@ -528,6 +537,22 @@ impl<R: Scalar, const SPANS: usize> Winder<R, SPANS> {
         let r = self.state.r_uw.value().to_si(scale.r_uw);
         let brake = self.holders.brake_uw(r);
         self.holders.parent.hold(&brake, torque, t_uw, omega, r)
+    }
+
+    /// How the closed brakes of the drums hold the windup over the step that begins, where it is one body.
+    #[inline(never)]
+    fn hold_drums(&self, torque: &BySection<R::Si>, layer: R) -> Friction<R::Si> {
+        let scale = &self.scale;
+        let Holders {
+            contact, brakes, ..
+        } = &self.holders;
+        let v = self.state.v[SPANS - 1].value().to_si(scale.speed);
+        let r_wu = self.state.r_wu.value().to_si(scale.r_wu);
+        let roll = contact.shipping_roll(r_wu, v * layer.to_si(scale.one));
+        let t_sr = self.web.tension[SPANS - 1].to_si(scale.force);
+        let rd = brakes.rd.when(self.closed.rd);
+        let brake = rd.with(&brakes.fd.when(self.closed.fd));
+        contact.hold_whole(v, &roll, t_sr, &contact.drive(torque), &brake)
     }
 
     /// How nips and brakes of the windup hold over the step that starts at `x`.
