@@ -46,14 +46,18 @@ impl<T: Copy> Mailbox<T> {
 
     /// Leaves a value.
     pub fn set(&self, value: T) {
+        self.fill(|place| *place = value);
+    }
+
+    /// Leaves a value that `f` puts into its place, where an older one stands.
+    pub fn fill(&self, f: impl FnOnce(&mut T)) {
         let latest = self.latest.load(Ordering::Relaxed);
         let others = self.places.iter().enumerate().filter(|(i, _)| *i != latest);
-        for (i, place) in others {
-            if let Ok(mut place) = place.try_borrow_mut() {
-                *place = value;
-                self.latest.store(i, Ordering::Release);
-                return;
-            }
+        let mut free = others.filter_map(|(i, place)| Some((i, place.try_borrow_mut().ok()?)));
+        // Between one writer and one reader there always is one.
+        if let Some((i, mut place)) = free.next() {
+            f(&mut place);
+            self.latest.store(i, Ordering::Release);
         }
     }
 }

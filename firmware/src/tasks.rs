@@ -252,9 +252,14 @@ impl<'a, W: Stopwatch> Rate<'a, W> {
         }
     }
 
-    async fn release(&mut self) {
+    /// The next release. Not awaited here: a future within the task's would cost as much as the timer itself.
+    fn next(&mut self) -> Timer {
         self.due += self.period;
-        Timer::at(self.due).await;
+        Timer::at(self.due)
+    }
+
+    /// It has come.
+    fn begin(&mut self) {
         self.began = W::count();
         let now = Instant::now();
         self.late = now - self.due;
@@ -286,7 +291,8 @@ pub async fn plant<W: Stopwatch, R: Scalar>(
     let mut rate = Rate::<W>::new(start, PLANT_PERIOD_MS, Task::Plant, life, times);
     let mut number = 0_u32;
     loop {
-        rate.release().await;
+        rate.next().await;
+        rate.begin();
         let own = || (plant.clone(), exchange.actuators.get());
         if let Some((other, actuators)) = exchange.plant_hatch.pass(number, own) {
             *plant = other;
@@ -313,22 +319,31 @@ pub async fn drive<W: Stopwatch, R: Scalar>(
     let mut rate = Rate::<W>::new(start, DRIVE_PERIOD_MS, Task::Drive, life, times);
     let mut number = 0_u32;
     loop {
-        rate.release().await;
+        rate.next().await;
+        rate.begin();
         let own = || (*drive, exchange.command.get());
         if let Some((other, command)) = exchange.drive_hatch.pass(number, own) {
             *drive = other;
             exchange.command.set(command);
         }
-        let (measurements, record) = exchange.measurements.get();
-        let command = &exchange.command;
-        let (actuators, status) = command.look(|command| drive.step(command, &measurements));
-        exchange.actuators.set(actuators);
-        exchange.cycle.set(Cycle {
-            number,
-            due: rate.due,
+        let Exchange {
             measurements,
-            status,
-            record,
+            command,
+            actuators,
+            cycle,
+            ..
+        } = exchange;
+        // what comes of it goes straight to where it is looked at
+        measurements.look(|(measurements, record)| {
+            command.look(|command| {
+                actuators.fill(|actuators| {
+                    cycle.fill(|cycle| {
+                        drive.step(command, measurements, actuators, &mut cycle.status);
+                        (cycle.number, cycle.due) = (number, rate.due);
+                        (cycle.measurements, cycle.record) = (*measurements, *record);
+                    });
+                });
+            });
         });
         number = number.wrapping_add(1);
         exchange.cycles.store(number, Ordering::Release);

@@ -15,7 +15,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use anyhow::Result;
 use model_core::drive::{DRIVE_PERIOD_MS, Drive};
-use model_core::exchange::{Actuators, Brakes, DriveCommand, Measurements};
+use model_core::exchange::{Actuators, Brakes, DriveCommand, DriveStatus, Measurements};
 use model_core::image::Feedback;
 use model_core::logic::Logic;
 use model_core::machine::{MAX_SPANS, Machine};
@@ -644,15 +644,16 @@ fn drive<N: Number, const SPANS: usize>(machine: &Machine) -> Result<Recorder> {
             continue;
         };
         let (acts, status) = recorder.call(
-            || drive.step(&command, &measurements),
+            || {
+                let (mut acts, mut status) = (actuators, DriveStatus::default());
+                drive.step(&command, &measurements, &mut acts, &mut status);
+                (acts, status)
+            },
             |_| "drive",
             |(acts, status)| {
                 let mut numbers = acts.torque.into_array().to_vec();
                 numbers.extend([status.v, status.v_ref, status.a_ref, status.v_uw]);
                 numbers.extend([status.r_uw, status.tension_ref]);
-                for of_section in [status.torque, status.load, status.power] {
-                    numbers.extend(of_section.into_array());
-                }
                 numbers
             },
         );

@@ -32,6 +32,9 @@ fn the_drives_need_nothing_but_measurements() {
     let mut alone = drive::Drive::<f32>::new(&machine);
     let mut whole =
         model_core::drive::Drive::<f32>::new(&model_core::machine::Machine::news_8000());
+    let (mut actuators, mut status): (exchange::Actuators<_>, exchange::DriveStatus<_>) =
+        Default::default();
+    let (mut expected, mut theirs_told) = Default::default();
     let mut toy = Toy::default();
     let (r_uw, r_rd) = (1.5, 0.425);
     let (mut moved, mut step) = (0, exchange::TuneStep::Idle);
@@ -97,8 +100,8 @@ fn the_drives_need_nothing_but_measurements() {
             d_wu: m.d_wu,
             ..Default::default()
         };
-        let (actuators, status) = alone.step(&command, &m);
-        let (expected, _) = whole.step(&same, &seen);
+        alone.step(&command, &m, &mut actuators, &mut status);
+        whole.step(&same, &seen, &mut expected, &mut theirs_told);
         let torque = actuators.torque.into_array();
         assert_eq!(
             torque.map(f32::to_bits),

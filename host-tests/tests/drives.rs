@@ -7,7 +7,7 @@ mod bench;
 
 use bench::{Bench, CYCLE};
 use model_core::drive::Drive;
-use model_core::drive::motor::{Motor, Overload};
+use model_core::drive::motor::{Motor, Motors, Overload};
 use model_core::drive::reference::SCurve;
 use model_core::drive::table::Table;
 use model_core::exchange::{BySection, DriveCommand, Measurements, UnwindControl};
@@ -140,7 +140,7 @@ mod overload {
     /// A roll that does not turn, and a drive that wants it to: 150 % for a minute, then 100 %. A smaller limit of the
     /// PLC's holds.
     #[test]
-    fn the_drive_keeps_its_motors_within_their_overload() {
+    fn motors_are_kept_within_their_overload() {
         let machine = Machine::news_8000();
         for (limit, first, then) in [
             (1.5, 1.5, 1.0),
@@ -149,34 +149,37 @@ mod overload {
             (0.5, 0.5, 0.5),
         ] {
             let mut drive = Drive::<f64>::new(&machine);
-            let command = DriveCommand {
+            let mut command = DriveCommand {
                 unwind: UnwindControl::Speed,
                 drums: true,
                 v_target: 30.0,
                 acceleration: 1.0,
                 jerk: 1.0,
-                torque_limit: BySection::all(limit),
                 ..DriveCommand::default()
             };
             let m = Measurements::default();
+            let mut motors = Motors::<f64>::new(&machine, CYCLE);
             let mut at = |seconds: f64| {
-                let periods = (seconds / CYCLE) as u32;
-                let mut status = Default::default();
-                (0..periods).for_each(|_| (_, status) = drive.step(&command, &m));
-                status
+                let (mut actuators, mut status) = Default::default();
+                for _ in 0..(seconds / CYCLE) as u32 {
+                    command.torque_limit = motors.allowed().map(|allowed| allowed.min(limit));
+                    drive.step(&command, &m, &mut actuators, &mut status);
+                    motors.heat(&status.torque, &m.omega);
+                }
+                (motors.load(&status.torque), motors.exhausted())
             };
-            let early = at(50.0);
-            for load in [early.load.uw, early.load.fd] {
+            let (load, exhausted) = at(50.0);
+            for load in [load.uw, load.fd] {
                 near("load", load, first, 1e-9);
             }
-            assert_eq!(early.overloaded, BySection::all(false));
+            assert_eq!(exhausted, BySection::all(false));
             // the ramp has taken up to 40 s of it
-            let late = at(60.0);
-            for load in [late.load.uw, late.load.fd] {
+            let (load, exhausted) = at(60.0);
+            for load in [load.uw, load.fd] {
                 near("load", load, then, 1e-9);
             }
-            assert_eq!(late.overloaded.uw, then < first);
-            assert_eq!(late.overloaded.fd, then < first);
+            assert_eq!(exhausted.uw, then < first);
+            assert_eq!(exhausted.fd, then < first);
         }
     }
 }
@@ -243,9 +246,13 @@ mod windup {
             (b.command.torque_limit.rd, b.command.torque_limit.fd) = (rd, fd);
             b.command.v_target = 30.0;
             b.wait(5.0);
-            let load = b.status.load;
-            let limited = if rd < fd { load.rd } else { load.fd };
-            near("limit", f64::from(limited), 0.15, 1e-6);
+            let (torque, motors) = (b.status.torque, &machine.motors);
+            let limited = if rd < fd {
+                f64::from(torque.rd) / motors.rd.torque_n_m
+            } else {
+                f64::from(torque.fd) / motors.fd.torque_n_m
+            };
+            near("limit", limited, 0.15, 1e-6);
             near("front", front_share(&b), share_at(b.x().r_wu), 1e-4);
         }
     }

@@ -7,7 +7,7 @@
 mod operator;
 
 use model_core::drive::{DRIVE_PERIOD_MS, Drive};
-use model_core::exchange::{Actuators, DriveCommand};
+use model_core::exchange::{Actuators, DriveCommand, DriveStatus};
 use model_core::fixed::Word;
 use model_core::image::{self, Commands, Feedback, Image};
 use model_core::logic::{Logic, Mode, command};
@@ -73,14 +73,14 @@ fn converge(machine: &Machine, commands: &[Commands]) -> Vec<Sample> {
     let mut winder = Winder::<f64, 3>::new(machine, FINE).unwrap();
     let (mut drive, mut logic) = (Drive::new(machine), Logic::new(machine));
     let (mut actuators, mut command) = (Actuators::default(), DriveCommand::default());
+    let mut status = DriveStatus::default();
     let (mut feedback, record) = (Feedback::default(), Record::default());
     let samples = commands.iter().map(|commands| {
         let mut measurements = Default::default();
         for _ in 0..steps {
             measurements = winder.step(&actuators);
         }
-        let status;
-        (actuators, status) = drive.step(&command, &measurements);
+        drive.step(&command, &measurements, &mut actuators, &mut status);
         command = logic_tick(
             &mut logic,
             commands,

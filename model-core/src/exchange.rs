@@ -370,7 +370,7 @@ pub struct DriveCommand<R> {
     pub freeze_diameter: bool,
     /// The unwind's brake helps when its motor comes to its limit.
     pub brake_assist: bool,
-    /// Limits of the motors' torques, of rated torque; the motors' own overload limits them further.
+    /// Limits of the motors' torques, of rated torque.
     pub torque_limit: BySection<R>,
     /// Added to the front drum's share of the drum torque.
     pub front_share_trim: R,
@@ -409,14 +409,6 @@ pub struct DriveStatus<R> {
     pub tension_at_once: R,
     /// Torques that act on the shafts, N·m.
     pub torque: BySection<R>,
-    /// Torques of the motors, of rated torque.
-    pub load: BySection<R>,
-    /// Shaft powers, W.
-    pub power: BySection<R>,
-    /// Load of the rider roll per width as it is set, N/m.
-    pub rider_load: R,
-    /// Motors that have used up their overload and are limited to rated torque.
-    pub overloaded: BySection<bool>,
     /// Auto-tune.
     pub autotune: Autotune<R>,
 }

@@ -175,7 +175,12 @@ impl<R: Scalar, const SPANS: usize> Simulator<R, SPANS> {
             see(&self.measurements);
         }
         self.phase_ms = end % (PLANT_PERIOD_MS * DRIVE_PERIOD_MS);
-        (self.actuators, self.status) = self.drive.step(&self.command, &self.measurements);
+        self.drive.step(
+            &self.command,
+            &self.measurements,
+            &mut self.actuators,
+            &mut self.status,
+        );
         self.command = logic_tick(
             &mut self.logic,
             &image.commands,

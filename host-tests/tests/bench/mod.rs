@@ -125,7 +125,12 @@ impl<R: Scalar> Bench<R> {
             self.m = self.winder.step(&self.actuators);
         }
         self.phase_ms = end % (PLANT_PERIOD_MS * DRIVE_PERIOD_MS);
-        (self.actuators, self.status) = self.drive.step(&self.command, &self.m);
+        self.drive.step(
+            &self.command,
+            &self.m,
+            &mut self.actuators,
+            &mut self.status,
+        );
         let (torque, more) = (self.actuators.torque, self.disturbance);
         self.actuators.torque = torque.zip(more).map(|(t, more)| t + more);
     }

@@ -10,7 +10,9 @@ pub fn step(
     command: &DriveCommand<f32>,
     measurements: &Measurements<f32>,
     winder: &Winder<f32, 3>,
-) -> (Actuators<f32>, DriveStatus<f32>) {
+    actuators: &mut Actuators<f32>,
+    status: &mut DriveStatus<f32>,
+) {
     let tension = measurements.tension;
     #[cfg(feature = "r_uw")]
     let r_uw = measurements.r_uw;
@@ -19,8 +21,8 @@ pub fn step(
     #[cfg(feature = "state")]
     let state = measurements.state();
     #[cfg(feature = "winder")]
-    return drive.step(command, winder);
+    return drive.step(command, winder, actuators, status);
     #[cfg(feature = "winder_as_command")]
-    return drive.step(winder, measurements);
-    drive.step(command, measurements)
+    return drive.step(winder, measurements, actuators, status);
+    drive.step(command, measurements, actuators, status);
 }

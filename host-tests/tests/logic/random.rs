@@ -356,16 +356,16 @@ fn the_simulator_stays_within_its_limits_whatever_is_commanded() {
             last = mode;
             let s = o.simulator.status();
             let what = || format!("case {case}, cycle {cycle}, {mode:?}: {s:?}");
-            for (load, most) in s.load.into_array().into_iter().zip([1.5_f32; 4]) {
-                assert!(load.abs() <= most + 1e-6, "{}", what());
+            let motors = &machine.motors;
+            let rated = [&motors.uw, &motors.rd, &motors.fd, &motors.rr];
+            for (torque, motor) in s.torque.into_array().into_iter().zip(rated) {
+                let most = 1.5 * motor.torque_n_m as f32;
+                assert!(torque.abs() <= most * 1.000_001, "{}", what());
             }
-            let rated = [&machine.motors.uw, &machine.motors.rd, &machine.motors.fd];
-            for (power, motor) in s.power.into_array().into_iter().zip(rated) {
-                assert!(
-                    power.abs() <= 1.5 * motor.power_w as f32 * 1.001,
-                    "{}",
-                    what()
-                );
+            let powers = [&image::POWER_UW, &image::POWER_RD, &image::POWER_FD];
+            for (power, motor) in powers.into_iter().zip(rated) {
+                let most = 1.5e-3 * motor.power_w;
+                assert!(o.value(power).abs() <= most * 1.001, "{}", what());
             }
             assert!(
                 s.tension_ref >= -1e-3 && s.tension_ref <= 8001.0,

@@ -6,8 +6,8 @@ use super::motor::Motor;
 use super::pi::Pi;
 use super::table::Table;
 use super::tuning::DrumTuning;
-use crate::exchange::{BySection, Measurements, Rider};
-use crate::machine::{MAX_FRONT_SHARES, MAX_RIDER_LOADS, Machine};
+use crate::exchange::{BySection, Measurements};
+use crate::machine::{MAX_FRONT_SHARES, Machine};
 use crate::real::Real;
 
 /// Lag with which the drums take over the tension that the unwind holds, s.
@@ -41,8 +41,6 @@ struct Coefficients<R> {
     front_share: Table<R, MAX_FRONT_SHARES>,
     /// Rider roll's share of the winding force.
     rider_share: R,
-    /// Rider roll's load per width over the diameter, N/m.
-    rider_load: Table<R, MAX_RIDER_LOADS>,
     /// Share of a change of tension that a period makes up for.
     tension_share: R,
 }
@@ -78,8 +76,6 @@ impl<R: Real> Drums<R> {
         let path = &machine.idle[machine.load_cells.roll + 1..];
         let shares = machine.operation.front_share.iter();
         let shares = shares.map(|point| (point.diameter_m, point.share));
-        let loads = machine.nips.rider_load.iter();
-        let loads = loads.map(|point| (point.diameter_m, point.load_n_m));
         let r = R::of;
         Self {
             c: Coefficients {
@@ -94,7 +90,6 @@ impl<R: Real> Drums<R> {
                 rider_friction: r(rr.friction_n_s_m),
                 front_share: Table::new(shares),
                 rider_share: r(machine.operation.rider_share),
-                rider_load: Table::new(loads),
                 tension_share: r(-libm::expm1(-period / TENSION_LAG_S)),
             },
             tuning: *tuning,
@@ -127,15 +122,6 @@ impl<R: Real> Drums<R> {
     /// Radius of the rear drum, m.
     pub fn radius(&self) -> R {
         self.c.r_rd
-    }
-
-    /// Load of the rider roll per width as it is set, N/m.
-    pub fn rider_load(&self, rider: &Rider<R>, m: &Measurements<R>) -> R {
-        if rider.lifted {
-            R::ZERO
-        } else {
-            (R::ONE + rider.load_trim) * self.c.rider_load.at(m.d_wu)
-        }
     }
 
     /// Largest force of both drums with the same torque for each metre of radius, N.

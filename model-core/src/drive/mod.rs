@@ -14,15 +14,15 @@ pub mod tuning;
 pub mod unwind;
 
 use crate::exchange::{
-    Actuators, Brakes, BySection, DriveCommand, DriveStatus, Loop, Measurements, Rider, Setting,
-    TuneStep, UnwindControl,
+    Actuators, Brakes, BySection, DriveCommand, DriveStatus, Loop, Measurements, Setting, TuneStep,
+    UnwindControl,
 };
 use crate::machine::Machine;
 use crate::real::Real;
 use autotune::{Axis, Found, Span, Tuner};
 use diameter::DiameterEstimator;
 use drums::{DrumTask, Drums};
-use motor::{Motor, Overload};
+use motor::Motor;
 use pi::Gains;
 use reference::SCurve;
 use tuning::Tuning;
@@ -51,8 +51,8 @@ pub struct Drive<R: Real> {
     diameter: DiameterEstimator<R>,
     unwind: Unwind<R>,
     drums: Drums<R>,
-    motors: BySection<Motor<R>>,
-    overload: BySection<Overload<R>>,
+    /// The unwind's motor.
+    motor: Motor<R>,
     tuner: Tuner<R>,
     /// The tuning before auto-tune, as long as that is at work.
     kept: Option<Tuning<R>>,
@@ -70,13 +70,7 @@ impl<R: Real> Drive<R> {
     pub fn new(machine: &Machine) -> Self {
         let period = 1e-3 * f64::from(DRIVE_PERIOD_MS);
         let full = machine.operation.tension_n_m * machine.web.width_m;
-        let motor = |motor| Motor::new(motor, machine.motors.overload, period);
-        let motors = BySection {
-            uw: motor(&machine.motors.uw),
-            rd: motor(&machine.motors.rd),
-            fd: motor(&machine.motors.fd),
-            rr: motor(&machine.motors.rr),
-        };
+        let motors = Motor::of_sections(machine, period);
         let diameter = DiameterEstimator::new(machine, period);
         let tuning = Tuning::new(machine, period);
         Self {
@@ -96,8 +90,7 @@ impl<R: Real> Drive<R> {
                 period,
             ),
             drums: Drums::new(machine, &motors, &tuning.drums, period),
-            motors,
-            overload: BySection::default(),
+            motor: motors.uw,
             tuner: Tuner::new(machine, period),
             kept: None,
             web_present: R::of(0.5 * full * machine.operation.stall_share),
@@ -121,25 +114,25 @@ impl<R: Real> Drive<R> {
         self.unwind.tune(&tuning.unwind, self.diameter.radius());
     }
 
-    /// One period: references, diameter, auto-tune, unwind, drums, motors.
+    /// One period: references, diameter, auto-tune, unwind, drums, motors. What comes of it is put where it is wanted.
     pub fn step(
         &mut self,
         command: &DriveCommand<R>,
         m: &Measurements<R>,
-    ) -> (Actuators<R>, DriveStatus<R>) {
+        actuators: &mut Actuators<R>,
+        status: &mut DriveStatus<R>,
+    ) {
         let v = self.drums.speed(m);
         let tuned = self.follow_autotune(command, m);
         self.follow_references(command, v, tuned);
         self.estimate_diameter(command, m, v);
-        let limit = self.limits(command);
-        let torque = self.torques(command, m, v, limit, tuned);
+        let torque = self.torques(command, m, v, tuned);
         self.end_autotune(m);
-        self.heat_motors(m, &torque);
         let assist = command.brake_assist && (self.assisted || self.unwind.at_limit());
         self.assisted = assist;
-        let status = self.status(m, v, torque, &command.rider);
+        act(command, torque, assist, actuators);
+        self.tell(m, v, torque, status);
         self.last_tension = m.tension;
-        (act(command, torque, assist), status)
     }
 
     fn follow_references(&mut self, command: &DriveCommand<R>, v: R, tuned: Option<Loop>) {
@@ -167,30 +160,14 @@ impl<R: Real> Drive<R> {
             .step(v, m.omega.uw, command.freeze_diameter || no_web);
     }
 
-    /// Limits of torque, of rated torque: what is commanded, as far as the motors' overload goes.
-    fn limits(&self, command: &DriveCommand<R>) -> BySection<R> {
-        command
-            .torque_limit
-            .zip(self.motors.zip(self.overload))
-            .map(|(limit, (motor, overload))| limit.min(motor.allowed(&overload)))
-    }
-
-    fn heat_motors(&mut self, m: &Measurements<R>, torque: &BySection<R>) {
-        let (motors, o) = (&self.motors, &mut self.overload);
-        motors.uw.heat(&mut o.uw, torque.uw, m.omega.uw);
-        motors.rd.heat(&mut o.rd, torque.rd, m.omega.rd);
-        motors.fd.heat(&mut o.fd, torque.fd, m.omega.fd);
-        motors.rr.heat(&mut o.rr, torque.rr, m.omega.rr);
-    }
-
     fn torques(
         &mut self,
         command: &DriveCommand<R>,
         m: &Measurements<R>,
         v: R,
-        limit: BySection<R>,
         tuned: Option<Loop>,
     ) -> BySection<R> {
+        let limit = command.torque_limit;
         let a_ref = if command.no_inertia_compensation {
             R::ZERO
         } else {
@@ -255,8 +232,8 @@ impl<R: Real> Drive<R> {
         let axis = Axis {
             omega: m.omega.uw,
             r,
-            limit: self.motors.uw.limit(m.omega.uw, limit),
-            rated: self.motors.uw.rated(),
+            limit: self.motor.limit(m.omega.uw, limit),
+            rated: self.motor.rated(),
             inertia: tuning.inertia(r),
             friction: tuning.friction * square,
             braked: m.brakes.uw,
@@ -363,15 +340,9 @@ impl<R: Real> Drive<R> {
         gains.setting(self.period)
     }
 
-    fn status(
-        &self,
-        m: &Measurements<R>,
-        v: R,
-        torque: BySection<R>,
-        rider: &Rider<R>,
-    ) -> DriveStatus<R> {
+    fn tell(&self, m: &Measurements<R>, v: R, torque: BySection<R>, status: &mut DriveStatus<R>) {
         let r_uw = self.diameter.radius();
-        DriveStatus {
+        *status = DriveStatus {
             v,
             v_ref: self.speed.value(),
             a_ref: self.speed.rate(),
@@ -380,29 +351,26 @@ impl<R: Real> Drive<R> {
             tension_ref: self.tension.value(),
             tension_at_once: self.last_tension + self.per_filter * (m.tension - self.last_tension),
             torque,
-            load: torque.zip(self.motors).map(|(t, motor)| motor.load(t)),
-            power: torque.zip(m.omega).map(|(t, omega)| t * omega),
-            rider_load: self.drums.rider_load(rider, m),
-            overloaded: self.overload.map(|overload| overload.is_exhausted()),
             autotune: *self.tuner.report(),
-        }
+        };
     }
 }
 
-/// What acts on the winder: torques, brakes with the unwind's that assists or not, and what is passed through. Not
-/// inlined: that is copied in one piece so, not byte by byte.
-#[inline(never)]
-fn act<R: Real>(command: &DriveCommand<R>, torque: BySection<R>, assist: bool) -> Actuators<R> {
-    Actuators {
-        torque,
-        brakes: Brakes {
-            uw: command.brakes.uw || assist,
-            ..command.brakes
-        },
-        rider: command.rider,
-        handling: command.handling,
-        faults: command.faults,
-    }
+/// What acts on the winder: torques, brakes with the unwind's that assists or not, and what is passed through.
+fn act<R: Real>(
+    command: &DriveCommand<R>,
+    torque: BySection<R>,
+    assist: bool,
+    actuators: &mut Actuators<R>,
+) {
+    actuators.torque = torque;
+    actuators.brakes = Brakes {
+        uw: command.brakes.uw || assist,
+        ..command.brakes
+    };
+    actuators.rider = command.rider;
+    actuators.handling = command.handling;
+    actuators.faults = command.faults;
 }
 
 /// Stiffness of the whole web path EA/ΣL, N/m.

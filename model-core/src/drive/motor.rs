@@ -7,7 +7,8 @@
 //! the rated torque is the limit until all of it has been given off again. Below base speed i is the torque, above it
 //! the power. 150 % for 60 s is duty class II of IEC 60146-1-1.
 
-use crate::machine;
+use crate::exchange::BySection;
+use crate::machine::{self, Machine};
 use crate::real::Real;
 
 /// Limits of a motor.
@@ -15,6 +16,8 @@ use crate::real::Real;
 pub struct Motor<R> {
     torque: R,
     power: R,
+    /// Speed from which on the power is the limit, rad/s.
+    base: R,
     per_torque: R,
     per_power: R,
     overload: R,
@@ -36,12 +39,25 @@ pub struct Overload<R> {
 }
 
 impl<R: Real> Motor<R> {
+    /// Those of a winder, looked at every `period` seconds.
+    pub fn of_sections(machine: &Machine, period: f64) -> BySection<Self> {
+        let motors = &machine.motors;
+        let motor = |motor| Self::new(motor, motors.overload, period);
+        BySection {
+            uw: motor(&motors.uw),
+            rd: motor(&motors.rd),
+            fd: motor(&motors.fd),
+            rr: motor(&motors.rr),
+        }
+    }
+
     /// From its description, its overload of rated torque, and the period, s.
     pub fn new(motor: &machine::Motor, overload: f64, period: f64) -> Self {
         let excess = (overload * overload - 1.0).max(LEAST_OVERLOAD);
         Self {
             torque: R::of(motor.torque_n_m),
             power: R::of(motor.power_w),
+            base: R::of(motor.power_w / motor.torque_n_m),
             per_torque: R::of(1.0 / motor.torque_n_m),
             per_power: R::of(1.0 / motor.power_w),
             overload: R::of(overload),
@@ -76,9 +92,9 @@ impl<R: Real> Motor<R> {
 
     /// Largest torque at a speed, N·m: `share` of the rated one, above the base speed of constant power.
     pub fn limit(&self, omega: R, share: R) -> R {
-        let demand = self.torque * omega.abs();
-        let torque = if demand > self.power {
-            self.power / omega.abs()
+        let omega = omega.abs();
+        let torque = if omega > self.base {
+            self.power / omega
         } else {
             self.torque
         };
@@ -93,6 +109,49 @@ impl<R: Real> Motor<R> {
     /// A torque as share of the rated one.
     pub fn load(&self, torque: R) -> R {
         torque * self.per_torque
+    }
+}
+
+/// The motors of a winder, protected against what they cannot take.
+#[derive(Clone, Copy, Debug)]
+pub struct Motors<R> {
+    motors: BySection<Motor<R>>,
+    overload: BySection<Overload<R>>,
+}
+
+impl<R: Real> Motors<R> {
+    /// Rested, looked at every `period` seconds.
+    pub fn new(machine: &Machine, period: f64) -> Self {
+        Self {
+            motors: Motor::of_sections(machine, period),
+            overload: BySection::default(),
+        }
+    }
+
+    /// One period of torques at speeds.
+    pub fn heat(&mut self, torque: &BySection<R>, omega: &BySection<R>) {
+        let (motors, o) = (&self.motors, &mut self.overload);
+        motors.uw.heat(&mut o.uw, torque.uw, omega.uw);
+        motors.rd.heat(&mut o.rd, torque.rd, omega.rd);
+        motors.fd.heat(&mut o.fd, torque.fd, omega.fd);
+        motors.rr.heat(&mut o.rr, torque.rr, omega.rr);
+    }
+
+    /// What their overload allows at the moment, of rated torque.
+    pub fn allowed(&self) -> BySection<R> {
+        self.motors
+            .zip(self.overload)
+            .map(|(motor, overload)| motor.allowed(&overload))
+    }
+
+    /// Those that are limited to their rated torque until they have recovered.
+    pub fn exhausted(&self) -> BySection<bool> {
+        self.overload.map(|overload| overload.is_exhausted())
+    }
+
+    /// Torques as shares of the rated ones.
+    pub fn load(&self, torque: &BySection<R>) -> BySection<R> {
+        torque.zip(self.motors).map(|(t, motor)| motor.load(t))
     }
 }
 

@@ -46,11 +46,11 @@ impl<R: Real> Pi<R> {
     pub fn step(&mut self, gains: &Gains<R>, error: R, feed_forward: R, low: R, high: R) -> R {
         let increment = gains.integral * error;
         let output = feed_forward + gains.proportional * error + self.integral + increment;
-        let pushes_out =
-            (output > high && increment > R::ZERO) || (output < low && increment < R::ZERO);
+        let limited = output.clamp(low, high);
+        let pushes_out = output != limited && (output > limited) == (increment > R::ZERO);
         if !pushes_out {
             self.integral += increment;
         }
-        output.clamp(low, high)
+        limited
     }
 }

@@ -60,9 +60,16 @@ impl<R: Real> SCurve<R> {
         }
         let change = jerk * self.period;
         let half = change * R::of(0.5);
-        let rounding = (half * half + (jerk + jerk) * distance.abs()).sqrt() - half;
         let last = distance.abs() * self.per_period;
-        let size = rounding.min(rate).min(last);
+        let largest = rate.min(last);
+        // far from the target no root is needed to see that it is far
+        let reach = half * half + (jerk + jerk) * distance.abs();
+        let beyond = largest + half;
+        let size = if beyond * beyond > reach {
+            (reach.sqrt() - half).min(largest)
+        } else {
+            largest
+        };
         let wanted = if distance < R::ZERO { -size } else { size };
         self.rate = wanted.clamp(self.rate - change, self.rate + change);
         let way = self.rate * self.period;

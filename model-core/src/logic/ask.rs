@@ -36,6 +36,12 @@ impl<R: Real> Logic<R> {
             (row.unwind, row.brakes.uw) = (UnwindControl::Off, true);
         }
         let unless = |tripped: bool, limit: R| if tripped { R::ZERO } else { limit };
+        let torque_limit = BySection {
+            uw: unless(tripped.uw, get(&image::TORQUE_LIMIT_UW) * percent),
+            rd: drum_limit,
+            fd: drum_limit,
+            rr: unless(tripped.rr, drum_limit),
+        };
         DriveCommand {
             unwind: row.unwind,
             drums: row.drums,
@@ -47,12 +53,9 @@ impl<R: Real> Logic<R> {
             preset: self.one_shot.preset,
             freeze_diameter: matches!(self.mode, Mode::WebBreakStop | Mode::UnwindManeuver),
             brake_assist: self.mode == Mode::EmergencyStop && !tripped.uw,
-            torque_limit: BySection {
-                uw: unless(tripped.uw, get(&image::TORQUE_LIMIT_UW) * percent),
-                rd: drum_limit,
-                fd: drum_limit,
-                rr: unless(tripped.rr, drum_limit),
-            },
+            torque_limit: torque_limit
+                .zip(self.motors.allowed())
+                .map(|(limit, allowed)| limit.min(allowed)),
             // a drum that has tripped leaves all to the other one
             front_share_trim: match (tripped.rd, tripped.fd) {
                 (true, _) => R::ONE,

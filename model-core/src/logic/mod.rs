@@ -33,11 +33,14 @@ pub use words::{
     inject, status, warning,
 };
 
+use crate::drive::motor::Motors;
+use crate::drive::table::Table;
 use crate::exchange::{
-    Autotune, Brakes, BySection, DriveCommand, DriveStatus, Handling, Loop, Measurements, TuneStep,
+    Autotune, Brakes, BySection, DriveCommand, DriveStatus, Handling, Loop, Measurements, Rider,
+    TuneStep,
 };
 use crate::image::{self, Commands, Feedback};
-use crate::machine::Machine;
+use crate::machine::{MAX_RIDER_LOADS, Machine};
 use crate::profidrive::stw1;
 use crate::real::Real;
 use bus::Bus;
@@ -103,6 +106,7 @@ pub struct Logic<R> {
     sections: BySection<Section>,
     refusal: Refusal,
     faults: Faults,
+    motors: Motors<R>,
     /// The command word of the last cycle.
     last_command: u16,
     last_acknowledge: bool,
@@ -126,6 +130,8 @@ pub struct Logic<R> {
     frozen: Option<R>,
     /// Brakes as they were asked for in the last cycle.
     asked: Brakes<bool>,
+    /// The rider roll as it was asked for in the last cycle: what has been set by now.
+    rider: Rider<R>,
     /// What the answer tells of auto-tune.
     told: Autotune<R>,
     one_shot: OneShot<R>,
@@ -157,6 +163,8 @@ struct Coefficients<R> {
     detected: R,
     lost: R,
     load_cell_zero: R,
+    /// Rider roll's load per width over the diameter, N/m.
+    rider_load: Table<R, MAX_RIDER_LOADS>,
 }
 
 /// What the logic sees of the machine and the PLC in one cycle.
@@ -196,6 +204,13 @@ impl<R: Real> Logic<R> {
                 detected: r(TENSION_DETECTED),
                 lost: r(WEB_BREAK),
                 load_cell_zero: r(LOAD_CELL_ZERO * tension),
+                rider_load: Table::new(
+                    machine
+                        .nips
+                        .rider_load
+                        .iter()
+                        .map(|point| (point.diameter_m, point.load_n_m)),
+                ),
             },
             patience: Patience {
                 brake: cycles(machine.brakes.delay_s + BRAKE_PATIENCE_S),
@@ -207,6 +222,7 @@ impl<R: Real> Logic<R> {
             sections: BySection::default(),
             refusal: Refusal::default(),
             faults: Faults::default(),
+            motors: Motors::new(machine, 1.0 / f64::from(CYCLES_PER_S)),
             last_command: 0,
             last_acknowledge: false,
             web_threaded: false,
@@ -223,6 +239,7 @@ impl<R: Real> Logic<R> {
             tuning_cycles: 0,
             frozen: None,
             asked: Brakes::default(),
+            rider: Rider::default(),
             told: Autotune::default(),
             one_shot: OneShot::default(),
             answer: Feedback::default(),
@@ -244,6 +261,7 @@ impl<R: Real> Logic<R> {
     ) -> DriveCommand<R> {
         let commands = &self.bus.receive(commands);
         (self.moved, self.one_shot) = (false, OneShot::default());
+        self.motors.heat(&drive.torque, &m.omega);
         self.switch_sections(commands);
         let sight = Sight {
             commands,
@@ -267,7 +285,7 @@ impl<R: Real> Logic<R> {
         self.answer = answer;
         self.bus.send(&answer, feedback);
         let command = self.ask(&sight);
-        self.asked = command.brakes;
+        (self.asked, self.rider) = (command.brakes, command.rider);
         command
     }
 
@@ -432,7 +450,7 @@ impl<R: Real> Logic<R> {
             },
             silent_uw: m.omega.uw == R::ZERO && !m.brakes.uw && (jogs || holds && turns(d.v)),
             silent_rd: m.omega.rd == R::ZERO && turns(m.omega.fd * c.r_fd),
-            overloaded: d.overloaded,
+            overloaded: self.motors.exhausted(),
             unwind_deviates: holds && fast && (d.v_uw - d.v).abs() > c.deviation * d.v.abs(),
             load_cell_zero: !self.web_threaded && m.tension.abs() > c.load_cell_zero,
         }

@@ -51,19 +51,23 @@ impl<R: Real> Logic<R> {
         f.set(&image::N_RD, rpm.rd);
         f.set(&image::N_FD, rpm.fd);
         f.set(&image::N_RR, rpm.rr);
-        let load = d.load.map(|share| share * R::of(100.0));
+        let load = self
+            .motors
+            .load(&d.torque)
+            .map(|share| share * R::of(100.0));
         f.set(&image::TORQUE_UW, load.uw);
         f.set(&image::TORQUE_RD, load.rd);
         f.set(&image::TORQUE_FD, load.fd);
         f.set(&image::TORQUE_RR, load.rr);
-        let power = d.power.map(|watt| watt * R::of(1e-3));
+        let power = d.torque.zip(m.omega);
+        let power = power.map(|(torque, omega)| torque * omega * R::of(1e-3));
         f.set(&image::POWER_UW, power.uw);
         f.set(&image::POWER_RD, power.rd);
         f.set(&image::POWER_FD, power.fd);
         f.set(&image::POWER_RR, power.rr);
         f.set(&image::D_UW, d.r_uw * R::of(2e3));
         f.set(&image::D_WU, m.d_wu * R::of(1e3));
-        f.set(&image::RIDER_LOAD, d.rider_load);
+        f.set(&image::RIDER_LOAD, self.rider_load(m.d_wu));
         let pulses = m.pulses_rd.wrapping_sub(self.pulses_at_core);
         f.set(&image::LENGTH_WU, f64::from(pulses) * c.metres_per_pulse);
         let ahead = u32::from(sight.commands.word(&image::PULSES_AHEAD)) << 16;
@@ -73,6 +77,14 @@ impl<R: Real> Logic<R> {
             self.told = d.autotune;
             tell_autotune(&d.autotune, f);
         }
+    }
+
+    /// Load of the rider roll per width as it is set, N/m.
+    fn rider_load(&self, d_wu: R) -> R {
+        if self.rider.lifted {
+            return R::ZERO;
+        }
+        (R::ONE + self.rider.load_trim) * self.c.rider_load.at(d_wu)
     }
 
     fn status(&self, sight: &Sight<R>, at_speed: bool) -> u16 {

@@ -5,7 +5,7 @@
 use core::hint::black_box;
 
 use model_core::drive::{DRIVE_PERIOD_MS, Drive};
-use model_core::exchange::{Actuators, Brakes, DriveCommand};
+use model_core::exchange::{Actuators, Brakes, DriveCommand, DriveStatus};
 use model_core::image::Feedback;
 use model_core::logic::Logic;
 use model_core::machine::{MAX_SPANS, Machine};
@@ -80,6 +80,7 @@ fn simulator<R: Scalar, const SPANS: usize>(machine: &Machine) -> Result<(), Err
     let mut plant = Plant::<R, SPANS>::new(machine).map_err(Error::Machine)?;
     let (mut drive, mut logic) = (Drive::<R::Si>::new(machine), Logic::<R::Si>::new(machine));
     let mut actuators = Actuators::default();
+    let mut status = DriveStatus::default();
     let mut command = DriveCommand::default();
     let mut feedback = Feedback::default();
     let mut plant_ticks = 0;
@@ -100,10 +101,10 @@ fn simulator<R: Scalar, const SPANS: usize>(machine: &Machine) -> Result<(), Err
         };
         let (drive, command_now) = (black_box(&mut drive), black_box(&command));
         count_begin();
-        let (acts, status) = drive.step(command_now, &measurements);
+        drive.step(command_now, &measurements, &mut actuators, &mut status);
         count_end();
         count_as_drive();
-        actuators = acts;
+        (actuators, status) = black_box((actuators, status));
 
         let (logic, feedback) = (black_box(&mut logic), black_box(&mut feedback));
         count_begin();
