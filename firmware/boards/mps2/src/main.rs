@@ -12,7 +12,6 @@
 #![allow(unsafe_code)]
 
 mod failure;
-mod http;
 mod interrupts;
 mod lan9118;
 mod net;

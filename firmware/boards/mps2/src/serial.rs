@@ -11,14 +11,13 @@ use core::future::poll_fn;
 use core::task::Poll;
 
 use atomic_waker::AtomicWaker;
+use board_cortex_m::net::LocalService;
 use embassy_executor::Spawner;
 use embassy_time::Duration;
 use embedded_io_async::{ErrorType, Read, Write};
-use firmware::link::control::{Peer, Protocol};
-use firmware::link::modbus::rtu::{Gaps, Station, session};
+use firmware::link::modbus::rtu::{Gaps, serve_line};
 
 use crate::interrupts::{self, Interrupt};
-use crate::net::LocalService;
 use crate::trace;
 
 /// The station's address on its line.
@@ -113,9 +112,5 @@ pub fn start(spawner: Spawner, service: LocalService) {
 
 #[embassy_executor::task]
 async fn serve(service: LocalService) {
-    let (mut uart, mut station) = (Uart::start(), Station::new(STATION));
-    if let Some(client) = service.enter(Peer::Serial, Protocol::ModbusRtu) {
-        // ends only with the line, which has no end here
-        let _ = session(&mut uart, &client, &mut station, Gaps::tolerant(GAP)).await;
-    }
+    serve_line(Uart::start(), service, STATION, Gaps::tolerant(GAP)).await;
 }

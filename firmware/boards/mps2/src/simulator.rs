@@ -5,33 +5,23 @@
 // A task that spawns on its own executor needs embassy's unsafe spawner.
 #![allow(unsafe_code)]
 
-use core::cell::RefCell;
-
+use board_cortex_m::Log;
+use board_cortex_m::net::{LocalDesk, LocalServed, LocalService};
 use embassy_executor::Spawner;
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::SPANS;
 use firmware::hmi::desk::{AtDesk, Board};
-use firmware::journal::Journal;
 use firmware::life::Started;
-use firmware::link::control::Control;
-use firmware::link::{ControlCell, ImageCell};
 use firmware::tasks;
 use model_core::drive::Drive;
-use model_core::image::{Commands, Feedback, Image};
-use model_core::logic::{Fault, Logic, Mode, Refusal};
+use model_core::logic::Logic;
 use model_core::machine::Machine;
 use model_core::restart::Restart;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
-use crate::http::LocalDesk;
-use crate::net::LocalService;
 use crate::trace::Traced;
 use crate::watchdog;
-
-/// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
-type LocalImage = ImageCell<NoopRawMutex>;
 
 /// What the simulator computes with: floating point on a core that has it.
 #[cfg(target_abi = "eabihf")]
@@ -77,16 +67,10 @@ pub async fn drive(start: Instant, exchange: &'static Exchange) {
 /// Everything that may wait: logic, network, and the beat for the pace.
 #[embassy_executor::task]
 pub async fn background(exchange: &'static Exchange, started: Started) {
-    static IMAGE: StaticCell<LocalImage> = StaticCell::new();
-    static CONTROL: StaticCell<ControlCell<NoopRawMutex>> = StaticCell::new();
+    static SERVED: StaticCell<LocalServed> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
 
-    let image = &*IMAGE.init(ImageCell::new(RefCell::new(Image {
-        commands: Commands::of(&machine()),
-        feedback: Feedback::default(),
-    })));
-    let control = &*CONTROL.init(ControlCell::new(RefCell::new(Control::default())));
-    let service = LocalService { image, control };
+    let service = SERVED.init(LocalServed::new(&machine())).service();
     let board = Board {
         name: "Cortex-M in QEMU (mps2)",
         version: env!("CARGO_PKG_VERSION"),
@@ -109,29 +93,4 @@ async fn logic(exchange: &'static Exchange, service: LocalService, desk: &'stati
     let mut logic = Logic::new(&machine());
     let image = service.image;
     tasks::logic::<Traced, _, _>(&mut logic, exchange, image, &mut Log, &mut at_desk).await;
-}
-
-/// The journal goes to the log: commands for a replay, states for people.
-struct Log;
-
-impl Journal for Log {
-    fn command(&mut self, cycle: u32, word: u16, value: u16) {
-        defmt::debug!("command {=u32} {=u16} {=u16}", cycle, word, value);
-    }
-
-    fn state(&mut self, _: u32, mode: Mode, fault: Fault, refusal: Refusal) {
-        match (fault, refusal) {
-            (Fault::None, Refusal::None) => defmt::info!("{=str}", mode.name()),
-            (Fault::None, _) => {
-                defmt::warn!("{=str}; refused: {=str}", mode.name(), refusal.name())
-            }
-            (_, Refusal::None) => defmt::error!("{=str}; fault: {=str}", mode.name(), fault.name()),
-            (_, _) => defmt::error!(
-                "{=str}; fault: {=str}; refused: {=str}",
-                mode.name(),
-                fault.name(),
-                refusal.name()
-            ),
-        }
-    }
 }

@@ -23,32 +23,31 @@
 #![allow(unsafe_code)]
 
 mod clock;
-mod failure;
-mod http;
+mod links;
 mod memory;
-mod net;
-mod panel;
-mod serial;
 mod settings;
 mod simulator;
-mod watchdog;
 mod wires;
 
+use board_cortex_m::net::{LocalDesk, LocalServed, LocalService};
+use board_stm32::lamps::Lamps;
+use board_stm32::watchdog::{self, Reset};
+use board_stm32::{ethernet, ethernet_pins};
 // The log: its way out.
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_futures::block_on;
 use embassy_stm32::gpio::{Input, Pull};
-use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::peripherals::IWDG1;
+use embassy_stm32::{Peri, interrupt, pac};
 use embassy_time::{Duration, Instant};
+use firmware::hmi::desk::Board;
 use firmware::store::{Network, Serial};
 use model_core::machine::Machine;
 use model_core::restart::Restart;
-use panel::Panel;
 use simulator::Exchange;
 use static_cell::StaticCell;
-use wires::Wires;
 
 static PLANT: InterruptExecutor = InterruptExecutor::new();
 static DRIVE: InterruptExecutor = InterruptExecutor::new();
@@ -84,12 +83,12 @@ fn main() -> ! {
     };
     memory::prepare(&mut core);
     let p = embassy_stm32::init(clock::config());
-    let started = watchdog::started();
-    let reset = Restart::TEXTS[usize::from(started.why.number())];
+    let started = watchdog::started(reset());
+    let why = Restart::TEXTS[usize::from(started.why.number())];
     defmt::info!(
         "paper winder simulator {=str} on NUCLEO-H743ZI2; {=str}",
         env!("CARGO_PKG_VERSION"),
-        reset
+        why
     );
     for (interrupt, priority) in [
         (interrupt::TIM3, Priority::P1),
@@ -102,12 +101,12 @@ fn main() -> ! {
         interrupt.set_priority(priority);
     }
 
-    let panel = Panel::new(p.PB0, p.PE1, p.PB14);
+    let lamps = Lamps::new([p.PB0.into(), p.PE1.into(), p.PB14.into()]);
     let button = Input::new(p.PC13, Pull::Down);
     // The flash answers at once: there is nothing to wait for.
     let (_store, settings) = block_on(settings::open(p.FLASH, button.is_high()));
     let machine = &*MACHINE.init(settings.machine);
-    let wires = Wires::new(
+    let wires = wires::new(
         machine,
         wires::Resources {
             rd: (p.TIM2, p.TIM1, p.PB10, p.PB11),
@@ -125,23 +124,9 @@ fn main() -> ! {
             ],
         },
     );
-    let ethernet = net::Resources {
-        eth: p.ETH,
-        sma: (p.ETH_SMA, p.PA2, p.PC1),
-        clock: (p.PA1, p.PA7),
-        rx: (p.PC4, p.PC5),
-        tx: (p.PG13, p.PB13, p.PG11),
-        rng: p.RNG,
-    };
-
-    let line = serial::Resources {
-        usart: p.USART2,
-        pins: (p.PD6, p.PD5, p.PD4),
-    };
-
     let start = Instant::now() + SETTLING;
     let timed = [PLANT.start(interrupt::UART7), DRIVE.start(interrupt::UART8)];
-    timed[0].spawn(watchdog::run(p.IWDG1).expect("first"));
+    timed[0].spawn(watch(p.IWDG1).expect("first"));
     let exchange = simulator::start(timed, start, machine, wires, started);
     let background = BACKGROUND.start(interrupt::SAI1);
     background.spawn(
@@ -149,12 +134,15 @@ fn main() -> ! {
             machine,
             exchange,
             Given {
-                panel,
-                ethernet,
+                lamps,
+                ethernet: ethernet_pins!(p),
                 network: settings.network,
-                line,
+                line: links::Line {
+                    usart: p.USART2,
+                    pins: (p.PD6, p.PD5, p.PD4),
+                },
                 serial: settings.serial,
-                reset,
+                why,
             },
         )
         .expect("first"),
@@ -165,25 +153,58 @@ fn main() -> ! {
     }
 }
 
-/// What the background gets of chip and settings.
-struct Given {
-    panel: Panel,
-    ethernet: net::Resources,
-    network: Network,
-    line: serial::Resources,
-    serial: Serial,
-    reset: &'static str,
+/// What the chip knows of its reset. Source: RM0433 rev. 8, section 8.7.37 (RCC_RSR).
+fn reset() -> Reset {
+    let flags = pac::RCC.rsr().read();
+    pac::RCC.rsr().modify(|w| w.set_rmvf(true));
+    // The pin's flag is set by every reset of the chip, so it says something only alone.
+    if flags.porrstf() || flags.borrstf() {
+        Reset::Power
+    } else if flags.iwdg1rstf() {
+        Reset::Watchdog
+    } else if flags.sftrstf() {
+        Reset::Program
+    } else {
+        Reset::Other
+    }
 }
 
-/// Everything that may wait: logic, panel, serial line, network.
+#[embassy_executor::task]
+async fn watch(device: Peri<'static, IWDG1>) {
+    watchdog::run(device).await
+}
+
+/// What the background gets of chip and settings.
+struct Given {
+    lamps: Lamps,
+    ethernet: ethernet::Pins,
+    network: Network,
+    line: links::Line,
+    serial: Serial,
+    why: &'static str,
+}
+
+/// Everything that may wait: logic, lamps, serial line, network.
 #[embassy_executor::task]
 async fn all_else(machine: &'static Machine, exchange: &'static Exchange, given: Given) {
+    static SERVED: StaticCell<LocalServed> = StaticCell::new();
+    static DESK: StaticCell<LocalDesk> = StaticCell::new();
+    let service = SERVED.init(LocalServed::new(machine)).service();
+    let board = Board {
+        name: "NUCLEO-H743ZI2",
+        version: env!("CARGO_PKG_VERSION"),
+        reset: given.why,
+    };
+    let desk = &*DESK.init(LocalDesk::new(board, machine));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    let service = simulator::service(machine);
-    let desk = simulator::desk(machine, given.reset);
     spawner.spawn(simulator::logic(machine, exchange, service, desk).expect("first"));
-    spawner.spawn(panel::run(given.panel, exchange, service).expect("first"));
-    serial::start(spawner, given.line, given.serial, service);
-    net::start(spawner, given.ethernet, given.network, service, desk);
+    spawner.spawn(show(given.lamps, exchange, service).expect("first"));
+    links::start_line(spawner, given.line, given.serial, service);
+    links::start_network(spawner, given.ethernet, given.network, service, desk);
+}
+
+#[embassy_executor::task]
+async fn show(lamps: Lamps, exchange: &'static Exchange, service: LocalService) {
+    lamps.run(exchange, service).await
 }

@@ -45,9 +45,7 @@ pub fn prepare(core: &mut Peripherals) {
     cortex_m::asm::isb();
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);
-    // counts cycles, for the task times
-    core.DCB.enable_trace();
-    core.DWT.enable_cycle_counter();
+    board_stm32::count_cycles(&mut core.DCB, &mut core.DWT);
 }
 
 /// The Ethernet's frames; called once, after [`prepare`].
