@@ -49,6 +49,13 @@ pub async fn keep<F: NorFlash, M: RawMutex>(store: &mut Store<F>, desk: &Desk<M>
     }
 }
 
+impl<M: RawMutex> Desk<M> {
+    /// Something stands in the flash that somebody has to decide about.
+    pub fn is_undecided(&self) -> bool {
+        self.with(|papers| papers.keeper.state() == State::Undecided)
+    }
+}
+
 impl Papers {
     /// Something has become of the settings.
     fn kept(&mut self, job: &Job, result: Result<(), SaveError>) {

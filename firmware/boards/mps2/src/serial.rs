@@ -20,8 +20,6 @@ use firmware::link::modbus::rtu::{Gaps, serve_line};
 use crate::interrupts::{self, Interrupt};
 use crate::trace;
 
-/// The station's address on its line.
-const STATION: u8 = 1;
 /// Longer than a pseudoterminal's writer pauses within a frame.
 const GAP: Duration = Duration::from_millis(10);
 
@@ -105,12 +103,12 @@ impl Write for Uart {
     }
 }
 
-/// Starts the line. Runs in the background.
-pub fn start(spawner: Spawner, service: LocalService) {
-    spawner.spawn(serve(service).expect("one line"));
+/// Starts the line, of which this is a station. Runs in the background.
+pub fn start(spawner: Spawner, service: LocalService, station: u8) {
+    spawner.spawn(serve(service, station).expect("one line"));
 }
 
 #[embassy_executor::task]
-async fn serve(service: LocalService) {
-    serve_line(Uart::start(), service, STATION, Gaps::tolerant(GAP)).await;
+async fn serve(service: LocalService, station: u8) {
+    serve_line(Uart::start(), service, station, Gaps::tolerant(GAP)).await;
 }

@@ -1,6 +1,6 @@
 //! The simulator's tasks on this board: the library's, given their place.
 //!
-//! Does not compute anything and does not know the machine beyond its preset.
+//! Does not compute anything and does not know the machine beyond its settings.
 
 // A task that spawns on its own executor needs embassy's unsafe spawner.
 #![allow(unsafe_code)]
@@ -12,6 +12,7 @@ use embassy_time::Instant;
 use firmware::SPANS;
 use firmware::hmi::desk::{AtDesk, Board};
 use firmware::life::Started;
+use firmware::store::{Keeper, Store};
 use firmware::tasks;
 use model_core::drive::Drive;
 use model_core::logic::Logic;
@@ -20,6 +21,7 @@ use model_core::restart::Restart;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
+use crate::settings::Flash;
 use crate::trace::Traced;
 use crate::watchdog;
 
@@ -45,14 +47,10 @@ pub fn exchange(started: Started) -> &'static Exchange {
     EXCHANGE.init(Exchange::new(&watchdog::LIFE, started))
 }
 
-fn machine() -> Machine {
-    Machine::news_8000()
-}
-
 /// The plant, every 4 ms.
 #[embassy_executor::task]
-pub async fn plant(start: Instant, exchange: &'static Exchange) {
-    match Plant::<Scalar, SPANS>::new(&machine()) {
+pub async fn plant(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
+    match Plant::<Scalar, SPANS>::new(machine) {
         Ok(mut plant) => tasks::plant::<Traced, _>(start, &mut plant, exchange).await,
         Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
     }
@@ -60,37 +58,53 @@ pub async fn plant(start: Instant, exchange: &'static Exchange) {
 
 /// The regulators, every 10 ms.
 #[embassy_executor::task]
-pub async fn drive(start: Instant, exchange: &'static Exchange) {
-    tasks::drive::<Traced, _>(start, &mut Drive::new(&machine()), exchange).await;
+pub async fn drive(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
+    tasks::drive::<Traced, _>(start, &mut Drive::new(machine), exchange).await;
 }
 
-/// Everything that may wait: logic, network, and the beat for the pace.
+/// What the background gets of the start.
+pub struct Given {
+    pub started: Started,
+    pub store: Option<Store<Flash>>,
+    pub keeper: Keeper,
+}
+
+/// Everything that may wait: logic, settings, network, and the beat for the pace.
 #[embassy_executor::task]
-pub async fn background(exchange: &'static Exchange, started: Started) {
+pub async fn background(machine: &'static Machine, exchange: &'static Exchange, given: Given) {
     static SERVED: StaticCell<LocalServed> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
 
-    let service = SERVED.init(LocalServed::new(&machine())).service();
+    let service = SERVED.init(LocalServed::new(machine)).service();
     let board = Board {
         name: "Cortex-M in QEMU (mps2)",
         version: env!("CARGO_PKG_VERSION"),
-        reset: Restart::TEXTS[usize::from(started.why.number())],
+        reset: Restart::TEXTS[usize::from(given.started.why.number())],
     };
-    let desk = &*DESK.init(LocalDesk::new(board, &machine()));
+    let (_, line) = given.keeper.in_use();
+    let desk = &*DESK.init(LocalDesk::keeping(board, given.keeper));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    spawner.spawn(logic(exchange, service, desk).expect("first"));
+    spawner.spawn(logic(machine, exchange, service, desk).expect("first"));
     spawner.spawn(crate::pace::pace().expect("first"));
     spawner.spawn(watchdog::feed().expect("first"));
-    crate::serial::start(spawner, service);
+    if let Some(store) = given.store {
+        spawner.spawn(crate::settings::keep(store, desk).expect("first"));
+    }
+    crate::serial::start(spawner, service, line.address);
     crate::net::start(spawner, service, desk);
 }
 
 #[embassy_executor::task]
-async fn logic(exchange: &'static Exchange, service: LocalService, desk: &'static LocalDesk) {
+async fn logic(
+    machine: &'static Machine,
+    exchange: &'static Exchange,
+    service: LocalService,
+    desk: &'static LocalDesk,
+) {
     let control = service.control;
     let mut at_desk = AtDesk { control, desk };
-    let mut logic = Logic::new(&machine());
+    let mut logic = Logic::new(machine);
     let image = service.image;
     tasks::logic::<Traced, _, _>(&mut logic, exchange, image, &mut Log, &mut at_desk).await;
 }

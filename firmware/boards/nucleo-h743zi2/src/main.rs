@@ -29,7 +29,8 @@ mod settings;
 mod simulator;
 mod wires;
 
-use board_cortex_m::net::{LocalDesk, LocalServed, LocalService};
+use board_cortex_m::net::{LocalDesk, LocalServed};
+use board_cortex_m::settings::open;
 use board_stm32::lamps::Lamps;
 use board_stm32::watchdog::{self, Reset};
 use board_stm32::{ethernet, ethernet_pins};
@@ -43,9 +44,10 @@ use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::{Peri, interrupt, pac};
 use embassy_time::{Duration, Instant};
 use firmware::hmi::desk::Board;
-use firmware::store::{Network, Serial};
+use firmware::store::{Keeper, Store};
 use model_core::machine::Machine;
 use model_core::restart::Restart;
+use settings::Sectors;
 use simulator::Exchange;
 use static_cell::StaticCell;
 
@@ -73,8 +75,8 @@ fn SAI1() {
     unsafe { BACKGROUND.on_interrupt() }
 }
 
-/// From switching on to the first activation of the timed tasks: the flash has been read by then.
-const SETTLING: Duration = Duration::from_millis(50);
+/// From the end of the settings' reading to the first activation of the timed tasks.
+const SETTLING: Duration = Duration::from_millis(10);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -96,6 +98,7 @@ fn main() -> ! {
         (interrupt::UART8, Priority::P2),
         (interrupt::ETH, Priority::P3),
         (interrupt::USART2, Priority::P3),
+        (interrupt::FLASH, Priority::P3),
         (interrupt::SAI1, Priority::P3),
     ] {
         interrupt.set_priority(priority);
@@ -103,9 +106,10 @@ fn main() -> ! {
 
     let lamps = Lamps::new([p.PB0.into(), p.PE1.into(), p.PB14.into()]);
     let button = Input::new(p.PC13, Pull::Down);
-    // The flash answers at once: there is nothing to wait for.
-    let (_store, settings) = block_on(settings::open(p.FLASH, button.is_high()));
-    let machine = &*MACHINE.init(settings.machine);
+    let flash = Sectors::new(p.FLASH);
+    // Only its repair takes time, which no task needs yet.
+    let (store, keeper) = block_on(open(flash, settings::RANGE, button.is_high()));
+    let machine = &*MACHINE.init(keeper.settings().machine.clone());
     let wires = wires::new(
         machine,
         wires::Resources {
@@ -136,12 +140,12 @@ fn main() -> ! {
             Given {
                 lamps,
                 ethernet: ethernet_pins!(p),
-                network: settings.network,
                 line: links::Line {
                     usart: p.USART2,
                     pins: (p.PD6, p.PD5, p.PD4),
                 },
-                serial: settings.serial,
+                store,
+                keeper,
                 why,
             },
         )
@@ -178,9 +182,9 @@ async fn watch(device: Peri<'static, IWDG1>) {
 struct Given {
     lamps: Lamps,
     ethernet: ethernet::Pins,
-    network: Network,
     line: links::Line,
-    serial: Serial,
+    store: Option<Store<Sectors>>,
+    keeper: Keeper,
     why: &'static str,
 }
 
@@ -195,16 +199,18 @@ async fn all_else(machine: &'static Machine, exchange: &'static Exchange, given:
         version: env!("CARGO_PKG_VERSION"),
         reset: given.why,
     };
-    let desk = &*DESK.init(LocalDesk::new(board, machine));
+    let (network, serial) = given.keeper.in_use();
+    let desk = &*DESK.init(LocalDesk::keeping(board, given.keeper));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(simulator::logic(machine, exchange, service, desk).expect("first"));
-    spawner.spawn(show(given.lamps, exchange, service).expect("first"));
-    links::start_line(spawner, given.line, given.serial, service);
-    links::start_network(spawner, given.ethernet, given.network, service, desk);
-}
-
-#[embassy_executor::task]
-async fn show(lamps: Lamps, exchange: &'static Exchange, service: LocalService) {
-    lamps.run(exchange, service).await
+    if let Some(store) = given.store {
+        spawner.spawn(settings::keep(store, desk).expect("first"));
+    }
+    links::start_line(spawner, given.line, serial, service);
+    links::start_network(spawner, given.ethernet, network, service, desk);
+    given
+        .lamps
+        .run(exchange, service, || desk.is_undecided())
+        .await
 }

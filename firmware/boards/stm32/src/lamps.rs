@@ -1,4 +1,5 @@
-//! Three lamps: green blinks while the firmware lives, yellow is lit while a client asks, red while a fault is latched.
+//! Three lamps: green blinks while the firmware lives, yellow is lit while a client asks, red while a fault is latched;
+//! it blinks while the settings wait for a decision.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
@@ -36,6 +37,7 @@ impl Lamps {
         mut self,
         exchange: &Exchange<R>,
         service: Service<'_, M>,
+        undecided: impl Fn() -> bool,
     ) -> ! {
         let (mut beat, mut asked) = (0_u32, 0);
         loop {
@@ -43,7 +45,8 @@ impl Lamps {
             beat = beat.wrapping_add(1);
             let lit = (beat / BLINK).is_multiple_of(2);
             self.green.set_level(lit.into());
-            self.red.set_level(exchange.outputs().fault.into());
+            let red = exchange.outputs().fault || (lit && undecided());
+            self.red.set_level(red.into());
             let requests = service
                 .image
                 .lock(|image| image.borrow().feedback.double(&image::LINK_REQUESTS));
