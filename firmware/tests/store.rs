@@ -173,19 +173,16 @@ fn whenever_the_power_fails_there_is_the_old_set_or_the_new_one() {
                 cut.cut = None;
                 let found = load(&mut cut);
                 let is_new = found == Content::Settings(new.clone());
-                // the first set has no old one: what is there is not settings yet
-                let is_old = found == old || n == 0;
+                let is_old = found == old;
                 assert!(
                     is_new || is_old,
                     "set {n}, step {step}, {torn:?}: {found:?}"
                 );
                 // and life goes on
                 let next = numbered(n + 100);
-                if n > 0 {
-                    save(&mut cut, &next)
-                        .unwrap_or_else(|e| panic!("set {n}, step {step}, {torn:?}: {e:?}"));
-                    assert_eq!(load(&mut cut), Content::Settings(next));
-                }
+                save(&mut cut, &next)
+                    .unwrap_or_else(|e| panic!("set {n}, step {step}, {torn:?}: {e:?}"));
+                assert_eq!(load(&mut cut), Content::Settings(next));
                 cuts += 1;
             }
         }
@@ -221,6 +218,61 @@ fn what_is_not_ours_is_kept_until_a_person_decides() {
     assert_eq!(block_on(store.load()), Content::Blank);
     block_on(store.save(&numbered(1))).unwrap();
     assert_eq!(block_on(store.load()), Content::Settings(numbered(1)));
+}
+
+/// Settings that were once whole are somebody's: damaged, they are not taken for a first write that was cut.
+#[test]
+fn damaged_settings_are_kept_until_a_person_decides() {
+    let mut whole = Flash::new();
+    save(&mut whole, &numbered(1)).unwrap();
+    let written = whole.bytes.iter().rposition(|byte| *byte != 0xff).unwrap();
+    let mut kept = 0;
+    for word in 1..written / WORD {
+        let mut flash = whole.clone();
+        for byte in &mut flash.bytes[word * WORD..(word + 1) * WORD] {
+            *byte = !*byte;
+        }
+        match load(&mut flash) {
+            Content::Unusable(Unusable::Foreign) => kept += 1,
+            // the seal's head: the settings are whole
+            found => assert_eq!(found, Content::Settings(numbered(1)), "word {word}"),
+        }
+        let saved = save(&mut flash, &numbered(2));
+        assert_eq!(
+            saved,
+            match load(&mut flash) {
+                Content::Settings(_) => Ok(()),
+                _ => Err(SaveError::Unusable),
+            }
+        );
+    }
+    assert!(kept > 40, "{kept}");
+}
+
+/// Emptied on purpose, whenever the power fails: the old set, or nothing of it.
+#[test]
+fn a_reset_that_is_cut_can_be_asked_for_again() {
+    let mut whole = Flash::new();
+    for n in 0..5 {
+        save(&mut whole, &numbered(n)).unwrap();
+    }
+    for step in 0..PAGES {
+        for torn in [Torn::Not, Torn::Half, Torn::Done] {
+            let mut cut = whole.clone();
+            (cut.cut, cut.steps) = (Some((step, torn)), 0);
+            let mut store = Store::new(&mut cut, 0..SIZE as u32).unwrap();
+            assert_eq!(block_on(store.discard()), Err(SaveError::Flash));
+            cut.cut = None;
+            match load(&mut cut) {
+                Content::Settings(settings) => assert_eq!(settings, numbered(4)),
+                Content::Blank | Content::Unusable(Unusable::Foreign) => (),
+                other => panic!("page {step}, {torn:?}: {other:?}"),
+            }
+            let mut store = Store::new(&mut cut, 0..SIZE as u32).unwrap();
+            block_on(store.discard()).unwrap();
+            assert_eq!(block_on(store.load()), Content::Blank);
+        }
+    }
 }
 
 #[test]

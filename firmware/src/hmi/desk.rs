@@ -9,6 +9,7 @@ use core::fmt;
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::RawMutex;
+use embassy_sync::signal::Signal as Wake;
 use embassy_sync::watch::{Receiver, Watch};
 use embassy_time::Instant;
 use model_core::image::{self, Commands, Feedback, Image, Signal};
@@ -25,6 +26,7 @@ use super::setup::Setup;
 use crate::attendant::{Attendant, Done, Order};
 use crate::link::ControlCell;
 use crate::link::control::{Control, Controller};
+use crate::store::Keeper;
 
 /// Streams of signals at once; each has a connection of its own.
 pub const STREAMS: usize = 12;
@@ -45,6 +47,8 @@ pub struct Desk<M: RawMutex> {
     /// The board.
     pub board: Board,
     cycles: Watch<M, u32, STREAMS>,
+    /// The settings shall be brought to the flash.
+    pub(super) settle: Wake<M, ()>,
     papers: Mutex<M, RefCell<Papers>>,
 }
 
@@ -54,6 +58,7 @@ pub(super) struct Papers {
     pub cycle: u32,
     pub auth: Auth,
     pub setup: Setup,
+    pub keeper: Keeper,
     pub events: Events,
     pub recorder: Recorder,
     pub panel: Panel,
@@ -83,19 +88,31 @@ enum Then {
 }
 
 impl<M: RawMutex> Desk<M> {
-    /// The desk of a board at power-up, with the machine that it simulates.
+    /// The desk of a board at power-up, with the machine that it simulates; it keeps no settings.
     pub fn new(board: Board, machine: &Machine) -> Self {
+        Self::keeping(board, Keeper::nowhere(machine))
+    }
+
+    /// The desk of a board at power-up, with the settings that it keeps.
+    pub fn keeping(board: Board, keeper: Keeper) -> Self {
+        let machine = &keeper.settings().machine;
         let setup = Setup::new(machine);
+        let mut events = Events::default();
+        if let Some(why) = keeper.unusable() {
+            events.add(0, "settings", format_args!("defaults: {why}"));
+        }
         Self {
             board,
             cycles: Watch::new(),
+            settle: Wake::new(),
             papers: Mutex::new(RefCell::new(Papers {
                 cycle: 0,
                 auth: Auth::new(),
                 setup,
-                events: Events::default(),
+                events,
                 recorder: Recorder::new(Commands::of(machine)),
                 panel: Panel::new(machine),
+                keeper,
                 snapshot: None,
                 forget_times: false,
                 leaving: false,
@@ -117,7 +134,7 @@ impl<M: RawMutex> Desk<M> {
 
 impl Papers {
     /// Somebody did something to the simulator.
-    fn audit(&mut self, text: fmt::Arguments) {
+    pub fn audit(&mut self, text: fmt::Arguments) {
         self.events.add(self.cycle, "audit", text);
     }
 
@@ -214,6 +231,8 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                     };
                     if papers.setup.in_use != snapshot.machine {
                         papers.setup.is_in_use(snapshot.machine.clone());
+                        papers.keeper.runs(&snapshot.machine);
+                        self.desk.settle.signal(());
                     }
                     papers.panel = snapshot.panel.clone();
                     match then {
@@ -401,6 +420,8 @@ impl<M: RawMutex> Hmi<'_, M> {
             let machine = papers.setup.apply(revision)?;
             let revision = papers.setup.revision;
             papers.audit(format_args!("parameters applied, revision {revision}"));
+            papers.keeper.runs(&machine);
+            self.desk.settle.signal(());
             papers.order(Order::Rebuild(machine), Then::Rebuild)
         })
     }

@@ -19,7 +19,7 @@ use super::Hmi;
 use super::answer::{Document, List, OrNull, Out, Text};
 use super::desk::locked;
 use super::recorder::Beginning;
-use super::setup;
+use super::{settings, setup};
 use crate::link::control::{Client, Controller, POLL_EDGES_MS, Peer, Writer};
 
 /// The name in lists.
@@ -39,6 +39,7 @@ pub enum What {
     Panel,
     Parameters,
     Presets,
+    Settings,
     Gains,
     Link,
     Events { after: u32 },
@@ -69,6 +70,7 @@ impl<M: RawMutex> Document for Page<'_, M> {
             What::Panel => self.panel(out).await,
             What::Parameters => self.parameters(out).await,
             What::Presets => presets(out).await,
+            What::Settings => settings::write(self.hmi, out).await,
             What::Gains => self.gains(out).await,
             What::Link => self.link(out).await,
             What::Events { after } => self.events(out, after).await,

@@ -13,6 +13,7 @@
 //! | `live` | the stream of signals |
 //! | [`desk`] | what there is beside the image, and the way to the simulator |
 //! | `setup` | the machine's parameters, staged and applied as one |
+//! | `settings` | what the board remembers, and whether it does |
 //! | [`panel`] | the operator panel's sequence |
 //! | `events`, `recorder` | what has happened, and every command with its cycle |
 
@@ -31,6 +32,7 @@ mod live;
 pub mod panel;
 mod recorder;
 pub mod routes;
+mod settings;
 mod setup;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
@@ -40,6 +42,7 @@ use picoserve::{Config, Router, Server, Timeouts};
 
 use crate::link::Service;
 use desk::Desk;
+pub use settings::keep;
 
 /// Bytes that a board gives each connection for what it reads: a request's head, and the longest body.
 pub const BUFFER_BYTES: usize = HEAD_BYTES + BODY_BYTES;

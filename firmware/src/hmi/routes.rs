@@ -60,6 +60,9 @@ enum Action {
     Unstage,
     Preset,
     Apply,
+    Connect,
+    Overwrite,
+    ResetSettings,
     Keep,
     Restore { replay: bool },
     ForgetTimes,
@@ -113,6 +116,10 @@ pub static ROUTES: &[Route] = routes! {
     Post   "parameters/preset" session Action::Preset, "stages a preset";
     Post   "parameters/apply"  session Action::Apply, "what is staged goes into use, at standstill: the machine is at power-up then";
     Get    "presets"           anybody Action::Show(What::Presets), "the machines that ship, and which of them can run here";
+    Get    "settings"          anybody Action::Show(What::Settings), "what the board remembers, and whether it is stored";
+    Put    "settings"          session Action::Connect, "network and serial line for the next start";
+    Post   "settings/overwrite" session Action::Overwrite, "what is in use takes the place of what is of no use in the flash";
+    Delete "settings"          session Action::ResetSettings, "empties the flash: the next start has the defaults";
     Get    "gains"             anybody Action::Show(What::Gains), "the gains of the loop that auto-tune has looked at";
     Get    "link"              anybody Action::Show(What::Link), "the links' clients, and who wrote which command last";
     Get    "events"            anybody Action::Events, "what has happened, after the event of the number `after`";
@@ -233,6 +240,9 @@ impl<'a, M: RawMutex> Routes<'a, M> {
                     .with(|papers| papers.setup.stage_preset(revision, name))?;
             }
             Action::Apply => hmi.apply(body::read::<body::Seen>(body)?.revision)?,
+            Action::Connect => hmi.connect(body)?,
+            Action::Overwrite => hmi.overwrite()?,
+            Action::ResetSettings => hmi.reset_settings()?,
             Action::Keep => hmi.keep()?,
             Action::Restore { replay } => hmi.restore(replay)?,
             Action::ForgetTimes => hmi.desk.with(|papers| papers.forget_times = true),

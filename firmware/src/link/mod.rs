@@ -8,7 +8,8 @@ use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::Instant;
-use model_core::image::Image;
+use model_core::image::{Commands, Feedback, Image};
+use model_core::machine::Machine;
 
 use self::control::{ClientId, Control, Peer, Protocol};
 
@@ -24,6 +25,35 @@ pub type ImageCell<M> = Mutex<M, RefCell<Image>>;
 
 /// Control of the winder as the links share it. Who needs both locks takes the image's first.
 pub type ControlCell<M> = Mutex<M, RefCell<Control>>;
+
+/// What a board keeps for its links.
+pub struct Served<M: RawMutex> {
+    /// The process image.
+    pub image: ImageCell<M>,
+    /// Who may write it.
+    pub control: ControlCell<M>,
+}
+
+impl<M: RawMutex> Served<M> {
+    /// A machine's at power-up.
+    pub fn new(machine: &Machine) -> Self {
+        Self {
+            image: Mutex::new(RefCell::new(Image {
+                commands: Commands::of(machine),
+                feedback: Feedback::default(),
+            })),
+            control: Mutex::new(RefCell::new(Control::default())),
+        }
+    }
+
+    /// What a link serves of it.
+    pub fn service(&self) -> Service<'_, M> {
+        Service {
+            image: &self.image,
+            control: &self.control,
+        }
+    }
+}
 
 /// What a link serves.
 pub struct Service<'a, M: RawMutex> {

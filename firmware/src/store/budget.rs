@@ -1,7 +1,7 @@
 //! How often the flash is written.
 
 /// Seconds for which one more write is saved up: a quarter of an hour.
-const REFILL_S: u32 = 15 * 60;
+pub const REFILL_S: u32 = 15 * 60;
 /// Writes that may follow each other at once, for somebody who tries settings.
 const BURST: u32 = 10;
 
@@ -35,5 +35,10 @@ impl Budget {
             self.saved -= REFILL_S;
         }
         enough
+    }
+
+    /// Writes that would not have to wait.
+    pub fn left(&self) -> u32 {
+        self.saved / REFILL_S
     }
 }

@@ -6,9 +6,11 @@
 //! and says why.
 //!
 //! Below is the log of the crate `sequential-storage`, which spreads the wear over all pages and gives each item a
-//! check sum. [`Budget`] bounds how often it is written.
+//! check sum. [`Budget`] bounds how often it is written. [`Keeper`] knows what shall stand there, and whether it does.
 
 mod budget;
+mod keeper;
+mod ram;
 mod settings;
 
 use core::ops::Range;
@@ -20,12 +22,19 @@ use sequential_storage::cache::{Cache, CacheImpl};
 use sequential_storage::map::{MapConfig, MapStorage};
 
 pub use budget::Budget;
-pub use settings::{Invalid, Network, Parity, SETTINGS_MAX, Serial, Settings};
+pub use keeper::{Job, Keeper, State};
+pub use ram::Ram;
+pub use settings::{
+    ADDRESSES, BAUDS, Invalid, Network, PREFIXES, Parity, SETTINGS_MAX, Serial, Settings,
+};
 
 /// The key of the one item, with the version of its form: settings of another form are not found. It is long enough
 /// to tell by it that a flash is this firmware's.
 type Key = [u8; 16];
 const KEY: Key = *b"winder settings1";
+/// The key of an empty item that is stored once settings have been. Without it the power has failed while the first
+/// settings were written, and there is nothing to lose; with it settings that cannot be found are damaged.
+const SEAL: Key = *b"winder has once1";
 
 /// Room to encode key and settings in, rounded up to a flash word.
 const BUFFER: usize = KEY.len() + SETTINGS_MAX + 64;
@@ -37,7 +46,7 @@ const BUFFER: usize = KEY.len() + SETTINGS_MAX + 64;
     reason = "without a heap it has to be somewhere"
 )]
 pub enum Content {
-    /// Nothing was ever stored.
+    /// Nothing was ever stored as a whole.
     Blank,
     /// Settings.
     Settings(Settings),
@@ -71,6 +80,8 @@ pub struct Store<F> {
     range: Range<u32>,
     /// There is something that must not be overwritten.
     kept: bool,
+    /// Settings have been stored since the flash was empty.
+    sealed: bool,
 }
 
 impl<F: NorFlash> Store<F> {
@@ -82,6 +93,7 @@ impl<F: NorFlash> Store<F> {
             range,
             // until it has been looked at
             kept: true,
+            sealed: false,
         })
     }
 
@@ -93,27 +105,40 @@ impl<F: NorFlash> Store<F> {
     }
 
     async fn read(&mut self) -> Content {
-        match self
-            .holds(|bytes| bytes.iter().any(|byte| *byte != ERASED))
+        self.sealed = false;
+        self.look()
             .await
-        {
-            Ok(true) => (),
-            Ok(false) => return Content::Blank,
-            Err(()) => return Content::Unusable(Unusable::Flash),
+            .unwrap_or(Content::Unusable(Unusable::Flash))
+    }
+
+    async fn look(&mut self) -> Result<Content, ()> {
+        /// Words of the first write until the key stands there: the page's mark, the item's head, the key.
+        const BEGINNING: u32 = 3;
+        let all = self.range.clone();
+        let beginning = BEGINNING * F::WRITE_SIZE as u32;
+        let rest = (all.start + beginning).min(all.end)..all.end;
+        if !self.is_written(all.clone()).await? {
+            return Ok(Content::Blank);
         }
-        match fetch(ReadOnly(&mut self.flash), &self.range).await {
+        let begun = !self.is_written(rest).await?;
+        let own = begun || self.holds(&KEY).await?;
+        // Wherever it stands: what leads to it may be damaged.
+        self.sealed = self.holds(&SEAL).await?;
+        let settings = match fetch(ReadOnly(&mut self.flash), &self.range).await {
             // The log repairs itself where the power has failed; it may do so with what is its own.
-            Err(Refused::ReadOnly) => match self.holds(|bytes| bytes == KEY).await {
-                Ok(true) => match fetch(&mut self.flash, &self.range).await {
-                    Ok(content) => content,
-                    Err(_) => Content::Unusable(Unusable::Flash),
-                },
-                Ok(false) => Content::Unusable(Unusable::Foreign),
-                Err(()) => Content::Unusable(Unusable::Flash),
-            },
-            Err(Refused::Flash(_)) => Content::Unusable(Unusable::Flash),
-            Ok(content) => content,
-        }
+            Err(Refused::ReadOnly) if own => {
+                fetch(&mut self.flash, &self.range).await.map_err(|_| ())?
+            }
+            Err(Refused::ReadOnly) => None,
+            Err(Refused::Flash(_)) => return Err(()),
+            Ok(settings) => settings,
+        };
+        Ok(match settings {
+            Some(Ok(settings)) => Content::Settings(settings),
+            Some(Err(invalid)) => Content::Unusable(Unusable::Invalid(invalid)),
+            None if own && !self.sealed => Content::Blank,
+            None => Content::Unusable(Unusable::Foreign),
+        })
     }
 
     /// Stores settings in place of the old ones.
@@ -126,7 +151,15 @@ impl<F: NorFlash> Store<F> {
         let mut map = map(&mut self.flash, &self.range).ok_or(SaveError::Flash)?;
         map.store_item(&mut buffer, &KEY, &bytes)
             .await
-            .map_err(|_| SaveError::Flash)
+            .map_err(|_| SaveError::Flash)?;
+        if !self.sealed {
+            let nothing: &[u8] = &[];
+            map.store_item(&mut buffer, &SEAL, &nothing)
+                .await
+                .map_err(|_| SaveError::Flash)?;
+            self.sealed = true;
+        }
+        Ok(())
     }
 
     /// Empties the flash, whatever is in it: a person has decided.
@@ -136,21 +169,34 @@ impl<F: NorFlash> Store<F> {
             .erase(start, end)
             .await
             .map_err(|_| SaveError::Flash)?;
-        self.kept = false;
+        (self.kept, self.sealed) = (false, false);
         Ok(())
     }
 
-    /// Whether `is` holds for any bytes in a row that are as long as a key.
-    async fn holds(&mut self, is: impl Fn(&[u8]) -> bool) -> Result<bool, ()> {
-        const NEW: usize = 64;
-        const OLD: usize = KEY.len() - 1;
+    /// Whether anything in a range is not erased.
+    async fn is_written(&mut self, range: Range<u32>) -> Result<bool, ()> {
+        let mut piece = [ERASED; PIECE];
+        for at in range.clone().step_by(PIECE) {
+            let piece = &mut piece[..PIECE.min((range.end - at) as usize)];
+            self.flash.read(at, piece).await.map_err(|_| ())?;
+            if piece.iter().any(|byte| *byte != ERASED) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Whether a key stands anywhere.
+    async fn holds(&mut self, key: &Key) -> Result<bool, ()> {
+        const OLD: usize = size_of::<Key>() - 1;
         // The end of one piece stands before the next.
-        let mut window = [ERASED; OLD + NEW];
-        for at in self.range.clone().step_by(NEW) {
-            let length = NEW.min((self.range.end - at) as usize);
+        let mut window = [ERASED; OLD + PIECE];
+        for at in self.range.clone().step_by(PIECE) {
+            let length = PIECE.min((self.range.end - at) as usize);
             let piece = &mut window[OLD..OLD + length];
             self.flash.read(at, piece).await.map_err(|_| ())?;
-            if window[..OLD + length].windows(KEY.len()).any(&is) {
+            let mut places = window[..OLD + length].windows(key.len());
+            if places.any(|bytes| bytes == key) {
                 return Ok(true);
             }
             window.copy_within(length..length + OLD, 0);
@@ -159,23 +205,24 @@ impl<F: NorFlash> Store<F> {
     }
 }
 
+/// Bytes that are looked at together.
+const PIECE: usize = 64;
 /// A byte of erased flash.
 const ERASED: u8 = 0xff;
 
-/// What the log holds; fails where the flash does.
-async fn fetch<F: NorFlash>(flash: F, range: &Range<u32>) -> Result<Content, F::Error> {
-    let foreign = Ok(Content::Unusable(Unusable::Foreign));
+/// The settings of the log, if there are any; fails where the flash does.
+async fn fetch<F: NorFlash>(
+    flash: F,
+    range: &Range<u32>,
+) -> Result<Option<Result<Settings, Invalid>>, F::Error> {
     let mut buffer = [0; BUFFER];
     let Some(mut map) = map(flash, range) else {
-        return foreign;
+        return Ok(None);
     };
     match map.fetch_item::<&[u8]>(&mut buffer, &KEY).await {
-        Ok(Some(bytes)) => Ok(match Settings::decode(bytes) {
-            Ok(settings) => Content::Settings(settings),
-            Err(invalid) => Content::Unusable(Unusable::Invalid(invalid)),
-        }),
+        Ok(bytes) => Ok(bytes.map(Settings::decode)),
         Err(sequential_storage::Error::Storage { value, .. }) => Err(value),
-        _ => foreign,
+        Err(_) => Ok(None),
     }
 }
 

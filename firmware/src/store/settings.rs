@@ -4,6 +4,7 @@
 //! preset: a preset that a later version corrects does not change a machine that somebody has set up.
 
 use core::fmt;
+use core::ops::RangeInclusive;
 
 use heapless::Vec;
 use model_core::machine::{Machine, MachineError, Value, parameters};
@@ -50,7 +51,46 @@ impl Network {
         prefix: 24,
         gateway: None,
     };
+
+    /// Refuses what cannot be.
+    pub fn validate(&self) -> Result<(), Invalid> {
+        let Self::Static {
+            address,
+            prefix,
+            gateway,
+        } = *self
+        else {
+            return Ok(());
+        };
+        if !PREFIXES.contains(&prefix) {
+            return Err(Invalid::Prefix(prefix));
+        }
+        let hosts = u32::MAX >> prefix;
+        let is_host = |address: [u8; 4]| {
+            let host = u32::from_be_bytes(address) & hosts;
+            // this network, loopback, multicast and what is reserved (RFC 6890)
+            !matches!(address[0], 0 | 127 | 224..) && host != 0 && host != hosts
+        };
+        if !is_host(address) {
+            return Err(Invalid::Host(address));
+        }
+        let network = |address: [u8; 4]| u32::from_be_bytes(address) & !hosts;
+        let is_gateway = |gateway: &[u8; 4]| {
+            is_host(*gateway) && *gateway != address && network(*gateway) == network(address)
+        };
+        match gateway.filter(|gateway| !is_gateway(gateway)) {
+            Some(gateway) => Err(Invalid::Gateway(gateway)),
+            None => Ok(()),
+        }
+    }
 }
+
+/// Bits of the network's part.
+pub const PREFIXES: RangeInclusive<u8> = 1..=30;
+/// Speeds of the serial line, Bd.
+pub const BAUDS: RangeInclusive<u32> = 1200..=115_200;
+/// Addresses of a station. Source: MODBUS over Serial Line V1.02, section 2.2.
+pub const ADDRESSES: RangeInclusive<u8> = 1..=247;
 
 /// Parity of the serial line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,6 +112,19 @@ pub struct Serial {
     pub parity: Parity,
     /// Modbus address of this station.
     pub address: u8,
+}
+
+impl Serial {
+    /// Refuses what cannot be.
+    pub fn validate(&self) -> Result<(), Invalid> {
+        if !BAUDS.contains(&self.baud) {
+            return Err(Invalid::Baud(self.baud));
+        }
+        if !ADDRESSES.contains(&self.address) {
+            return Err(Invalid::Address(self.address));
+        }
+        Ok(())
+    }
 }
 
 impl Default for Serial {
@@ -104,6 +157,10 @@ pub enum Invalid {
     Unknown(u32),
     /// Bits of the network's part outside 1 to 30.
     Prefix(u8),
+    /// An address that no single machine of a network can have.
+    Host([u8; 4]),
+    /// A gateway that is not another machine of the same network.
+    Gateway([u8; 4]),
     /// Speed of the serial line outside 1 200 to 115 200.
     Baud(u32),
     /// Modbus address outside 1 to 247.
@@ -118,6 +175,15 @@ impl fmt::Display for Invalid {
             Self::Machine(error) => error.fmt(f),
             Self::Unknown(hash) => write!(f, "there is no parameter {hash:#010x}"),
             Self::Prefix(n) => write!(f, "network prefix = {n} is outside 1 to 30"),
+            Self::Host([a, b, c, d]) => {
+                write!(f, "{a}.{b}.{c}.{d} is not the address of a machine")
+            }
+            Self::Gateway([a, b, c, d]) => {
+                write!(
+                    f,
+                    "gateway = {a}.{b}.{c}.{d} is no other machine of the network"
+                )
+            }
             Self::Baud(n) => write!(f, "baud rate = {n} is outside 1200 to 115200"),
             Self::Address(n) => write!(f, "Modbus address = {n} is outside 1 to 247"),
             Self::Form => f.write_str("not settings"),
@@ -139,19 +205,8 @@ impl Settings {
     /// Refuses what cannot be.
     pub fn validate(&self) -> Result<(), Invalid> {
         self.machine.validate().map_err(Invalid::Machine)?;
-        if let Network::Static { prefix, .. } = self.network
-            && !(1..=30).contains(&prefix)
-        {
-            return Err(Invalid::Prefix(prefix));
-        }
-        if !(1200..=115_200).contains(&self.serial.baud) {
-            return Err(Invalid::Baud(self.serial.baud));
-        }
-        // Source: MODBUS over Serial Line V1.02, section 2.2
-        if !(1..=247).contains(&self.serial.address) {
-            return Err(Invalid::Address(self.serial.address));
-        }
-        Ok(())
+        self.network.validate()?;
+        self.serial.validate()
     }
 
     /// The settings as bytes, at the front of `buffer`.
@@ -262,6 +317,37 @@ mod tests {
             };
         };
         assert_eq!(refused(prefix), Invalid::Prefix(33));
+        for (address, prefix, gateway, wrong) in [
+            ([10, 0, 0, 0], 24, None, Invalid::Host([10, 0, 0, 0])),
+            ([10, 0, 0, 255], 24, None, Invalid::Host([10, 0, 0, 255])),
+            ([127, 0, 0, 1], 8, None, Invalid::Host([127, 0, 0, 1])),
+            ([239, 1, 1, 1], 24, None, Invalid::Host([239, 1, 1, 1])),
+            (
+                [10, 0, 0, 1],
+                24,
+                Some([10, 0, 1, 2]),
+                Invalid::Gateway([10, 0, 1, 2]),
+            ),
+            (
+                [10, 0, 0, 1],
+                24,
+                Some([10, 0, 0, 1]),
+                Invalid::Gateway([10, 0, 0, 1]),
+            ),
+        ] {
+            let network = Network::Static {
+                address,
+                prefix,
+                gateway,
+            };
+            assert_eq!(network.validate(), Err(wrong));
+        }
+        let right = Network::Static {
+            address: [10, 0, 1, 255],
+            prefix: 16,
+            gateway: Some([10, 0, 0, 1]),
+        };
+        assert_eq!(right.validate(), Ok(()));
         for bytes in [&[][..], &[0; 40], &[0xff; 300]] {
             assert!(Settings::decode(bytes).is_err());
         }

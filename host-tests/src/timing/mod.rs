@@ -50,8 +50,8 @@ const PERIODS: [(&str, u32); 3] = [
 ];
 /// Where embassy keeps a task.
 const POOL: &str = "::POOL";
-/// The package of the board.
-const PACKAGE: &str = "board_mps2::";
+/// The packages of the board.
+const PACKAGES: [&str; 2] = ["board_mps2::", "board_cortex_m::"];
 
 /// What the firmware computes with on a core.
 pub fn scalar(core: &Core) -> &'static str {
@@ -215,7 +215,8 @@ fn name(elf: &Elf, address: u64) -> String {
     let Some(name) = elf.name(address) else {
         return format!("{address:#x}");
     };
-    let name = name.strip_prefix(PACKAGE).unwrap_or(name);
+    let own = PACKAGES.iter().find_map(|p| name.strip_prefix(p));
+    let name = own.unwrap_or(name);
     match name.strip_suffix(POOL) {
         Some(task) => task.to_owned(),
         None if name.contains("::") => name.to_owned(),

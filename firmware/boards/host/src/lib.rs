@@ -3,6 +3,7 @@
 //! Not here: priorities, since the simulator runs in lockstep, see [`Board::simulate`]; hard real time, since a thread of an
 //! ordinary process is late now and then, though no step is ever lost; addresses other than loopback.
 
+mod flash;
 mod http;
 
 use std::cell::RefCell;
@@ -13,22 +14,26 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use embassy_futures::block_on;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embedded_io_adapters::tokio_1::FromTokio;
 use firmware::attendant::Attendant;
 use firmware::hmi::desk::{self, AtDesk};
+use firmware::hmi::keep;
 use firmware::journal::Journal;
 use firmware::link::control::{Access, Control, Peer, Protocol};
 use firmware::link::modbus::tcp::{End, Timeouts, session};
 use firmware::link::seats::Seats;
 use firmware::link::{self, Service};
 use firmware::lockstep::Lockstep;
+use firmware::store::{Keeper, Store};
 use model_core::image::{Commands, Feedback, Image};
 use model_core::machine::Machine;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 use tokio::task::LocalSet;
 
+pub use flash::Flash;
 pub use http::{CONNECTIONS, Desk};
 
 /// Period of [`Board::start`]'s `step`: the drive cycle.
@@ -68,6 +73,8 @@ pub struct Options {
     pub image: Image,
     /// How many times real time the steps run; 1 is real time.
     pub pace: f64,
+    /// Where the settings are kept, if they are. The machine that is found there goes before the image's.
+    pub flash: Option<Flash>,
 }
 
 impl Default for Options {
@@ -82,6 +89,7 @@ impl Default for Options {
                 feedback: Feedback::default(),
             },
             pace: 1.0,
+            flash: None,
         }
     }
 }
@@ -116,7 +124,7 @@ impl Board {
         mut step: impl FnMut(&mut Image) + Send + 'static,
     ) -> io::Result<Self> {
         let mut cycle = 0_u32;
-        Self::run(options, move |image, mut at_desk| {
+        Self::run(options, None, move |image, mut at_desk| {
             at_desk.before(cycle, image);
             step(image);
             at_desk.after(cycle, image);
@@ -124,19 +132,33 @@ impl Board {
         })
     }
 
-    /// Starts serving, and simulates the machine of [`Options::default`] from power-up on, with a journal.
+    /// Starts serving, and simulates from power-up on, with a journal: the machine of the settings, or that of
+    /// [`Options::default`].
     ///
     /// # Errors
     /// As of [`Board::start`].
-    pub fn simulate(options: Options, journal: impl Journal + Send + 'static) -> io::Result<Self> {
-        let mut lockstep = power_up(journal);
-        Self::run(options, move |image, mut at_desk| {
+    pub fn simulate(
+        mut options: Options,
+        journal: impl Journal + Send + 'static,
+    ) -> io::Result<Self> {
+        let kept = options.flash.take().and_then(Kept::open);
+        let machine = match &kept {
+            Some(kept) => kept.keeper.settings().machine.clone(),
+            None => Machine::news_8000(),
+        };
+        if kept.is_some() {
+            options.image.commands = Commands::of(&machine);
+        }
+        let mut lockstep = Lockstep::new(&machine, &options.image, journal)
+            .map_err(|error| io::Error::other(error.to_string()))?;
+        Self::run(options, kept, move |image, mut at_desk| {
             lockstep.attended_cycle(image, &mut at_desk);
         })
     }
 
     fn run(
         options: Options,
+        kept: Option<Kept>,
         mut step: impl FnMut(&mut Image, AtDesk<'_, CriticalSectionRawMutex>) + Send + 'static,
     ) -> io::Result<Self> {
         let listen = |port| {
@@ -146,7 +168,11 @@ impl Board {
         };
         let (address, listener) = listen(options.port)?;
         let (http, http_listener) = listen(options.http_port)?;
-        let desk = Arc::new(Desk::new(BOARD, &Machine::news_8000()));
+        let (keeper, store) = match kept {
+            Some(kept) => (kept.keeper, Some(kept.store)),
+            None => (Keeper::nowhere(&Machine::news_8000()), None),
+        };
+        let desk = Arc::new(Desk::keeping(BOARD, keeper));
         let image = Arc::new(ImageCell::new(RefCell::new(options.image)));
         let control = Control::new(options.access);
         let control = Arc::new(ControlCell::new(RefCell::new(control)));
@@ -177,6 +203,10 @@ impl Board {
             let (server, desk) = (server, desk.clone());
             move || {
                 let local = LocalSet::new();
+                if let Some(mut store) = store {
+                    let desk = desk.clone();
+                    local.spawn_local(async move { keep(&mut store, &desk).await });
+                }
                 http::start(&local, http_listener, server, desk);
                 // What was spawned ends with the runtime.
                 let _ = local.block_on(&runtime, stopped);
@@ -225,10 +255,23 @@ impl Drop for Board {
     }
 }
 
-/// The simulator of the machine of [`Options::default`].
-fn power_up<J: Journal>(journal: J) -> Lockstep<J> {
-    Lockstep::new(&Machine::news_8000(), &Options::default().image, journal)
-        .expect("a preset is valid")
+/// The settings, and where they are kept.
+struct Kept {
+    keeper: Keeper,
+    store: Store<Flash>,
+}
+
+impl Kept {
+    /// As at power-up.
+    fn open(flash: Flash) -> Option<Self> {
+        let end = flash.size();
+        let mut store = Store::new(flash, 0..end)?;
+        let mut keeper = Keeper::of(block_on(store.load()));
+        keeper.note = Some(
+            "a process on a PC is on loopback and has no serial line: only the machine counts",
+        );
+        Some(Self { keeper, store })
+    }
 }
 
 /// Steps at whole multiples of the period after the start. A late step is made up for, in its turn, and so the

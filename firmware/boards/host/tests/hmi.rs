@@ -3,6 +3,8 @@
 // The helpers are of tests, too.
 #![allow(clippy::unwrap_used)]
 
+mod settings;
+
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::thread::sleep;

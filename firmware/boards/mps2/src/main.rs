@@ -12,13 +12,13 @@
 #![allow(unsafe_code)]
 
 mod failure;
-mod http;
 mod interrupts;
 mod lan9118;
 mod net;
 mod pace;
 mod register;
 mod serial;
+mod settings;
 mod simulator;
 mod stopwatch;
 mod time_driver;
@@ -26,17 +26,20 @@ mod trace;
 mod uart_log;
 mod watchdog;
 
-// How memory is copied.
-use board_copy as _;
 use embassy_executor::InterruptExecutor;
 use embassy_time::{Duration, Instant};
 use firmware::life::Task;
 use interrupts::Interrupt;
+use model_core::machine::Machine;
 use model_core::restart::Restart;
+use simulator::Given;
+use static_cell::StaticCell;
 
 static PLANT: InterruptExecutor = InterruptExecutor::new();
 static DRIVE: InterruptExecutor = InterruptExecutor::new();
 static BACKGROUND: InterruptExecutor = InterruptExecutor::new();
+
+static MACHINE: StaticCell<Machine> = StaticCell::new();
 
 extern "C" fn on_plant() {
     // SAFETY: this is the executor's interrupt, which only `start` enables.
@@ -82,6 +85,9 @@ fn main() -> ! {
         );
     }
 
+    let (store, keeper) = settings::at_start(started);
+    let machine = &*MACHINE.init(keeper.settings().machine.clone());
+
     watchdog::start();
     let start = Instant::now() + SETTLING;
     let plant = PLANT.start(Interrupt::Plant);
@@ -94,9 +100,14 @@ fn main() -> ! {
         None => {}
     }
     let exchange = simulator::exchange(started);
-    plant.spawn(simulator::plant(start, exchange).expect("first"));
-    drive.spawn(simulator::drive(start, exchange).expect("first"));
-    background.spawn(simulator::background(exchange, started).expect("first"));
+    plant.spawn(simulator::plant(start, machine, exchange).expect("first"));
+    drive.spawn(simulator::drive(start, machine, exchange).expect("first"));
+    let given = Given {
+        started,
+        store,
+        keeper,
+    };
+    background.spawn(simulator::background(machine, exchange, given).expect("first"));
 
     // Not an executor: embassy's idles in WFE, on which QEMU spins.
     loop {

@@ -11,18 +11,15 @@ use core::future::poll_fn;
 use core::task::Poll;
 
 use atomic_waker::AtomicWaker;
+use board_cortex_m::net::LocalService;
 use embassy_executor::Spawner;
 use embassy_time::Duration;
 use embedded_io_async::{ErrorType, Read, Write};
-use firmware::link::control::{Peer, Protocol};
-use firmware::link::modbus::rtu::{Gaps, Station, session};
+use firmware::link::modbus::rtu::{Gaps, serve_line};
 
 use crate::interrupts::{self, Interrupt};
-use crate::net::LocalService;
 use crate::trace;
 
-/// The station's address on its line.
-const STATION: u8 = 1;
 /// Longer than a pseudoterminal's writer pauses within a frame.
 const GAP: Duration = Duration::from_millis(10);
 
@@ -106,16 +103,12 @@ impl Write for Uart {
     }
 }
 
-/// Starts the line. Runs in the background.
-pub fn start(spawner: Spawner, service: LocalService) {
-    spawner.spawn(serve(service).expect("one line"));
+/// Starts the line, of which this is a station. Runs in the background.
+pub fn start(spawner: Spawner, service: LocalService, station: u8) {
+    spawner.spawn(serve(service, station).expect("one line"));
 }
 
 #[embassy_executor::task]
-async fn serve(service: LocalService) {
-    let (mut uart, mut station) = (Uart::start(), Station::new(STATION));
-    if let Some(client) = service.enter(Peer::Serial, Protocol::ModbusRtu) {
-        // ends only with the line, which has no end here
-        let _ = session(&mut uart, &client, &mut station, Gaps::tolerant(GAP)).await;
-    }
+async fn serve(service: LocalService, station: u8) {
+    serve_line(Uart::start(), service, station, Gaps::tolerant(GAP)).await;
 }

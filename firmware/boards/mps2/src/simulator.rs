@@ -1,37 +1,29 @@
 //! The simulator's tasks on this board: the library's, given their place.
 //!
-//! Does not compute anything and does not know the machine beyond its preset.
+//! Does not compute anything and does not know the machine beyond its settings.
 
 // A task that spawns on its own executor needs embassy's unsafe spawner.
 #![allow(unsafe_code)]
 
-use core::cell::RefCell;
-
+use board_cortex_m::Log;
+use board_cortex_m::net::{LocalDesk, LocalServed, LocalService};
 use embassy_executor::Spawner;
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use firmware::SPANS;
 use firmware::hmi::desk::{AtDesk, Board};
-use firmware::journal::Journal;
 use firmware::life::Started;
-use firmware::link::control::Control;
-use firmware::link::{ControlCell, ImageCell};
+use firmware::store::{Keeper, Store};
 use firmware::tasks;
 use model_core::drive::Drive;
-use model_core::image::{Commands, Feedback, Image};
-use model_core::logic::{Fault, Logic, Mode, Refusal};
+use model_core::logic::Logic;
 use model_core::machine::Machine;
 use model_core::restart::Restart;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
-use crate::http::LocalDesk;
-use crate::net::LocalService;
+use crate::settings::Flash;
 use crate::trace::Traced;
 use crate::watchdog;
-
-/// The image as the background's tasks share it: they take turns, so a lock need not keep anything off.
-type LocalImage = ImageCell<NoopRawMutex>;
 
 /// What the simulator computes with: floating point on a core that has it.
 #[cfg(target_abi = "eabihf")]
@@ -55,14 +47,10 @@ pub fn exchange(started: Started) -> &'static Exchange {
     EXCHANGE.init(Exchange::new(&watchdog::LIFE, started))
 }
 
-fn machine() -> Machine {
-    Machine::news_8000()
-}
-
 /// The plant, every 4 ms.
 #[embassy_executor::task]
-pub async fn plant(start: Instant, exchange: &'static Exchange) {
-    match Plant::<Scalar, SPANS>::new(&machine()) {
+pub async fn plant(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
+    match Plant::<Scalar, SPANS>::new(machine) {
         Ok(mut plant) => tasks::plant::<Traced, _>(start, &mut plant, exchange).await,
         Err(error) => defmt::panic!("{=str} = {=f64}", error.parameter, error.value),
     }
@@ -70,68 +58,53 @@ pub async fn plant(start: Instant, exchange: &'static Exchange) {
 
 /// The regulators, every 10 ms.
 #[embassy_executor::task]
-pub async fn drive(start: Instant, exchange: &'static Exchange) {
-    tasks::drive::<Traced, _>(start, &mut Drive::new(&machine()), exchange).await;
+pub async fn drive(start: Instant, machine: &'static Machine, exchange: &'static Exchange) {
+    tasks::drive::<Traced, _>(start, &mut Drive::new(machine), exchange).await;
 }
 
-/// Everything that may wait: logic, network, and the beat for the pace.
+/// What the background gets of the start.
+pub struct Given {
+    pub started: Started,
+    pub store: Option<Store<Flash>>,
+    pub keeper: Keeper,
+}
+
+/// Everything that may wait: logic, settings, network, and the beat for the pace.
 #[embassy_executor::task]
-pub async fn background(exchange: &'static Exchange, started: Started) {
-    static IMAGE: StaticCell<LocalImage> = StaticCell::new();
-    static CONTROL: StaticCell<ControlCell<NoopRawMutex>> = StaticCell::new();
+pub async fn background(machine: &'static Machine, exchange: &'static Exchange, given: Given) {
+    static SERVED: StaticCell<LocalServed> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
 
-    let image = &*IMAGE.init(ImageCell::new(RefCell::new(Image {
-        commands: Commands::of(&machine()),
-        feedback: Feedback::default(),
-    })));
-    let control = &*CONTROL.init(ControlCell::new(RefCell::new(Control::default())));
-    let service = LocalService { image, control };
+    let service = SERVED.init(LocalServed::new(machine)).service();
     let board = Board {
         name: "Cortex-M in QEMU (mps2)",
         version: env!("CARGO_PKG_VERSION"),
-        reset: Restart::TEXTS[usize::from(started.why.number())],
+        reset: Restart::TEXTS[usize::from(given.started.why.number())],
     };
-    let desk = &*DESK.init(LocalDesk::new(board, &machine()));
+    let (_, line) = given.keeper.in_use();
+    let desk = &*DESK.init(LocalDesk::keeping(board, given.keeper));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    spawner.spawn(logic(exchange, service, desk).expect("first"));
+    spawner.spawn(logic(machine, exchange, service, desk).expect("first"));
     spawner.spawn(crate::pace::pace().expect("first"));
     spawner.spawn(watchdog::feed().expect("first"));
-    crate::serial::start(spawner, service);
+    if let Some(store) = given.store {
+        spawner.spawn(crate::settings::keep(store, desk).expect("first"));
+    }
+    crate::serial::start(spawner, service, line.address);
     crate::net::start(spawner, service, desk);
 }
 
 #[embassy_executor::task]
-async fn logic(exchange: &'static Exchange, service: LocalService, desk: &'static LocalDesk) {
+async fn logic(
+    machine: &'static Machine,
+    exchange: &'static Exchange,
+    service: LocalService,
+    desk: &'static LocalDesk,
+) {
     let control = service.control;
     let mut at_desk = AtDesk { control, desk };
-    let mut logic = Logic::new(&machine());
+    let mut logic = Logic::new(machine);
     let image = service.image;
     tasks::logic::<Traced, _, _>(&mut logic, exchange, image, &mut Log, &mut at_desk).await;
-}
-
-/// The journal goes to the log: commands for a replay, states for people.
-struct Log;
-
-impl Journal for Log {
-    fn command(&mut self, cycle: u32, word: u16, value: u16) {
-        defmt::debug!("command {=u32} {=u16} {=u16}", cycle, word, value);
-    }
-
-    fn state(&mut self, _: u32, mode: Mode, fault: Fault, refusal: Refusal) {
-        match (fault, refusal) {
-            (Fault::None, Refusal::None) => defmt::info!("{=str}", mode.name()),
-            (Fault::None, _) => {
-                defmt::warn!("{=str}; refused: {=str}", mode.name(), refusal.name())
-            }
-            (_, Refusal::None) => defmt::error!("{=str}; fault: {=str}", mode.name(), fault.name()),
-            (_, _) => defmt::error!(
-                "{=str}; fault: {=str}; refused: {=str}",
-                mode.name(),
-                fault.name(),
-                refusal.name()
-            ),
-        }
-    }
 }

@@ -6,11 +6,12 @@
 //! that finds out who hangs, leaves it in memory that a start does not clear, and resets. Where even that fails the
 //! watchdog resets by itself, as much later again.
 
-// A record that survives a reset lies where no Rust code initializes it; an exception handler is unsafe to define.
+// A test's order lies where no Rust code initializes it; an exception handler is unsafe to define.
 #![allow(unsafe_code)]
 
 use core::mem::MaybeUninit;
 
+use board_cortex_m::record;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use embassy_time::{Duration, Instant, Timer};
@@ -48,62 +49,13 @@ mod device {
     pub const RESEN_INTEN: u32 = 1 << 1 | 1 << 0;
 }
 
-/// What a start leaves for the next.
-#[derive(Clone, Copy)]
-struct Record {
-    magic: u32,
-    why: u32,
-    times: u32,
-    /// Of the three above: memory after power-up is anything.
-    check: u32,
-}
-
-const MAGIC: u32 = u32::from_be_bytes(*b"why?");
-
-#[unsafe(link_section = ".uninit.RECORD")]
-static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
-
-impl Record {
-    fn of(started: Started) -> Self {
-        let (why, times) = (started.why.number().into(), started.times.into());
-        Self {
-            magic: MAGIC,
-            why,
-            times,
-            check: Self::check(why, times),
-        }
-    }
-
-    fn check(why: u32, times: u32) -> u32 {
-        !(MAGIC ^ why.rotate_left(8) ^ times.rotate_left(16))
-    }
-
-    /// What the last start has left; nothing after power-up.
-    fn read() -> Option<Started> {
-        // SAFETY: any bits are a record, and nobody else touches it: the background before it runs, or the NMI.
-        let record = unsafe { (&raw const RECORD).cast::<Self>().read_volatile() };
-        let sound = record.magic == MAGIC && record.check == Self::check(record.why, record.times);
-        let why = Restart::ALL.get(record.why as usize).filter(|_| sound)?;
-        Some(Started {
-            why: *why,
-            times: u16::try_from(record.times).unwrap_or(u16::MAX),
-        })
-    }
-
-    fn write(self) {
-        // SAFETY: as for `read`.
-        unsafe { (&raw mut RECORD).cast::<Self>().write_volatile(self) }
-    }
-}
-
 /// How this start has come about. A reset that nobody has announced is one from outside.
 pub fn started() -> Started {
-    let started = Record::read().unwrap_or_default();
-    Record::of(Started {
+    let started = record::noted().unwrap_or_default();
+    record::note(Started {
         why: Restart::Outside,
         ..started
-    })
-    .write();
+    });
     started
 }
 
@@ -134,12 +86,7 @@ pub async fn feed() -> ! {
 unsafe fn NonMaskableInt() -> ! {
     let now = Instant::now();
     let why = LIFE.hung(now).unwrap_or(Restart::GaveUp);
-    let times = Record::read().unwrap_or_default().times;
-    Record::of(Started {
-        why,
-        times: times.saturating_add(1),
-    })
-    .write();
+    record::note_restart(why);
     uart_log::reclaim();
     defmt::error!(
         "{=str}: restarting",

@@ -18,25 +18,21 @@
 // Interrupt handlers call into their executors.
 #![allow(unsafe_code)]
 
-mod net;
 mod simulator;
-mod watchdog;
 
-use core::panic::PanicInfo;
-
-use cortex_m::peripheral::SCB;
-// How memory is copied.
-use board_copy as _;
+use board_stm32::ethernet_pins;
+use board_stm32::watchdog::{self, Reset};
 // The log: its way out.
 use defmt_rtt as _;
 use embassy_executor::InterruptExecutor;
-use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllSource,
     Sysclk,
 };
 use embassy_stm32::time::Hertz;
+use embassy_stm32::{Peri, interrupt, pac};
 use embassy_time::{Duration, Instant};
 
 static PLANT: InterruptExecutor = InterruptExecutor::new();
@@ -99,9 +95,7 @@ fn main() -> ! {
         unreachable!("the entry point runs once")
     };
     let p = embassy_stm32::init(clocks());
-    // counts cycles, for the task times
-    core.DCB.enable_trace();
-    core.DWT.enable_cycle_counter();
+    board_stm32::count_cycles(&mut core.DCB, &mut core.DWT);
     defmt::info!(
         "paper winder simulator {=str} on NUCLEO-F207ZG",
         env!("CARGO_PKG_VERSION")
@@ -117,30 +111,37 @@ fn main() -> ! {
     }
 
     let start = Instant::now() + SETTLING;
-    let exchange = simulator::exchange(watchdog::started());
+    let exchange = simulator::exchange(watchdog::started(reset()));
     let plant = PLANT.start(interrupt::UART4);
     plant.spawn(simulator::plant(start, exchange).expect("first"));
-    plant.spawn(watchdog::run(p.IWDG).expect("first"));
+    plant.spawn(watch(p.IWDG).expect("first"));
     let drive = DRIVE.start(interrupt::UART5);
     drive.spawn(simulator::drive(start, exchange).expect("first"));
-    let ethernet = net::Resources {
-        eth: p.ETH,
-        sma: (p.ETH_SMA, p.PA2, p.PC1),
-        clock: (p.PA1, p.PA7),
-        rx: (p.PC4, p.PC5),
-        tx: (p.PG13, p.PB13, p.PG11),
-        rng: p.RNG,
-    };
     let background = BACKGROUND.start(interrupt::CAN1_TX);
-    background.spawn(simulator::background(exchange, ethernet).expect("first"));
+    background.spawn(simulator::background(exchange, ethernet_pins!(p)).expect("first"));
 
     loop {
         cortex_m::asm::wfi();
     }
 }
 
-#[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
-    defmt::error!("{}", defmt::Display2Format(info));
-    SCB::sys_reset()
+/// What the chip knows of its reset. Source: RM0033 rev. 9, section 5.3.21 (RCC_CSR).
+fn reset() -> Reset {
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    // The pin's flag is set by every reset of the chip, so it says something only alone.
+    if flags.porrstf() || flags.borrstf() {
+        Reset::Power
+    } else if flags.wdgrstf() {
+        Reset::Watchdog
+    } else if flags.sftrstf() {
+        Reset::Program
+    } else {
+        Reset::Other
+    }
+}
+
+#[embassy_executor::task]
+async fn watch(device: Peri<'static, IWDG>) {
+    watchdog::run(device).await
 }

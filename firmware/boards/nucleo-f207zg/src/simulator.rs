@@ -1,42 +1,28 @@
 //! The simulator's tasks on this board: the library's, in fixed point.
 
-use core::cell::RefCell;
-
-use cortex_m::peripheral::DWT;
+use board_cortex_m::Log;
+use board_cortex_m::net::{LocalServed, LocalService, start_modbus};
+use board_stm32::ethernet::{self, OTHER_SOCKETS};
+use board_stm32::watchdog;
 use embassy_executor::Spawner;
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_net::StackResources;
+use embassy_stm32::eth::PacketQueue;
 use embassy_time::Instant;
 use firmware::SPANS;
 use firmware::life::Started;
-use firmware::link::control::Control;
-use firmware::link::{ControlCell, ImageCell};
-use firmware::tasks::{self, Stopwatch};
+use firmware::net::MODBUS_SOCKETS;
+use firmware::store::Network;
+use firmware::tasks;
 use model_core::drive::Drive;
 use model_core::fixed::Word;
-use model_core::image::{Commands, Feedback, Image};
 use model_core::logic::Logic;
 use model_core::machine::Machine;
 use model_core::simulator::Plant;
 use static_cell::StaticCell;
 
-use crate::net::{self, LocalService};
-use crate::watchdog;
-
 /// What the tasks hand to each other.
 pub type Exchange = tasks::Exchange<Word>;
-
-type LocalImage = ImageCell<NoopRawMutex>;
-
-/// The core's own count of its cycles.
-struct Cycles;
-
-impl Stopwatch for Cycles {
-    const PER_US: u32 = crate::CORE_MHZ;
-
-    fn count() -> u32 {
-        DWT::cycle_count()
-    }
-}
+type Cycles = board_stm32::Cycles<{ crate::CORE_MHZ }>;
 
 /// What the tasks share, made once.
 pub fn exchange(started: Started) -> &'static Exchange {
@@ -65,29 +51,24 @@ pub async fn drive(start: Instant, exchange: &'static Exchange) {
 
 /// Everything that may wait: logic and network.
 #[embassy_executor::task]
-pub async fn background(exchange: &'static Exchange, ethernet: net::Resources) {
-    static IMAGE: StaticCell<LocalImage> = StaticCell::new();
-    static CONTROL: StaticCell<ControlCell<NoopRawMutex>> = StaticCell::new();
+pub async fn background(exchange: &'static Exchange, pins: ethernet::Pins) {
+    static SERVED: StaticCell<LocalServed> = StaticCell::new();
+    static FRAMES: StaticCell<PacketQueue<4, 6>> = StaticCell::new();
+    static RESOURCES: StaticCell<StackResources<{ MODBUS_SOCKETS + OTHER_SOCKETS }>> =
+        StaticCell::new();
 
-    let image = &*IMAGE.init(ImageCell::new(RefCell::new(Image {
-        commands: Commands::of(&machine()),
-        feedback: Feedback::default(),
-    })));
-    let control = &*CONTROL.init(ControlCell::new(RefCell::new(Control::default())));
+    let service = SERVED.init(LocalServed::new(&machine())).service();
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    spawner.spawn(logic(exchange, image).expect("first"));
-    net::start(spawner, ethernet, LocalService { image, control });
+    spawner.spawn(logic(exchange, service).expect("first"));
+    let frames = FRAMES.init(PacketQueue::new());
+    let resources = RESOURCES.init(StackResources::new());
+    let stack = ethernet::start(spawner, pins, frames, resources, Network::Dhcp);
+    start_modbus(spawner, stack, service);
 }
 
 #[embassy_executor::task]
-async fn logic(exchange: &'static Exchange, image: &'static LocalImage) {
-    tasks::logic::<Cycles, _, _>(
-        &mut Logic::new(&machine()),
-        exchange,
-        image,
-        &mut (),
-        &mut (),
-    )
-    .await;
+async fn logic(exchange: &'static Exchange, service: LocalService) {
+    let mut logic = Logic::new(&machine());
+    tasks::logic::<Cycles, _, _>(&mut logic, exchange, service.image, &mut Log, &mut ()).await;
 }

@@ -23,34 +23,33 @@
 #![allow(unsafe_code)]
 
 mod clock;
-mod failure;
-mod http;
+mod links;
 mod memory;
-mod net;
-mod panel;
-mod serial;
 mod settings;
 mod simulator;
-mod watchdog;
 mod wires;
 
-// How memory is copied.
-use board_copy as _;
+use board_cortex_m::net::{LocalDesk, LocalServed};
+use board_cortex_m::settings::open;
+use board_stm32::lamps::Lamps;
+use board_stm32::watchdog::{self, Reset};
+use board_stm32::{ethernet, ethernet_pins};
 // The log: its way out.
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_futures::block_on;
 use embassy_stm32::gpio::{Input, Pull};
-use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::peripherals::IWDG1;
+use embassy_stm32::{Peri, interrupt, pac};
 use embassy_time::{Duration, Instant};
-use firmware::store::{Network, Serial};
+use firmware::hmi::desk::Board;
+use firmware::store::{Keeper, Store};
 use model_core::machine::Machine;
 use model_core::restart::Restart;
-use panel::Panel;
+use settings::Sectors;
 use simulator::Exchange;
 use static_cell::StaticCell;
-use wires::Wires;
 
 static PLANT: InterruptExecutor = InterruptExecutor::new();
 static DRIVE: InterruptExecutor = InterruptExecutor::new();
@@ -76,8 +75,8 @@ fn SAI1() {
     unsafe { BACKGROUND.on_interrupt() }
 }
 
-/// From switching on to the first activation of the timed tasks: the flash has been read by then.
-const SETTLING: Duration = Duration::from_millis(50);
+/// From the end of the settings' reading to the first activation of the timed tasks.
+const SETTLING: Duration = Duration::from_millis(10);
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
@@ -86,12 +85,12 @@ fn main() -> ! {
     };
     memory::prepare(&mut core);
     let p = embassy_stm32::init(clock::config());
-    let started = watchdog::started();
-    let reset = Restart::TEXTS[usize::from(started.why.number())];
+    let started = watchdog::started(reset());
+    let why = Restart::TEXTS[usize::from(started.why.number())];
     defmt::info!(
         "paper winder simulator {=str} on NUCLEO-H743ZI2; {=str}",
         env!("CARGO_PKG_VERSION"),
-        reset
+        why
     );
     for (interrupt, priority) in [
         (interrupt::TIM3, Priority::P1),
@@ -99,17 +98,19 @@ fn main() -> ! {
         (interrupt::UART8, Priority::P2),
         (interrupt::ETH, Priority::P3),
         (interrupt::USART2, Priority::P3),
+        (interrupt::FLASH, Priority::P3),
         (interrupt::SAI1, Priority::P3),
     ] {
         interrupt.set_priority(priority);
     }
 
-    let panel = Panel::new(p.PB0, p.PE1, p.PB14);
+    let lamps = Lamps::new([p.PB0.into(), p.PE1.into(), p.PB14.into()]);
     let button = Input::new(p.PC13, Pull::Down);
-    // The flash answers at once: there is nothing to wait for.
-    let (_store, settings) = block_on(settings::open(p.FLASH, button.is_high()));
-    let machine = &*MACHINE.init(settings.machine);
-    let wires = Wires::new(
+    let flash = Sectors::new(p.FLASH);
+    // Only its repair takes time, which no task needs yet.
+    let (store, keeper) = block_on(open(flash, settings::RANGE, button.is_high()));
+    let machine = &*MACHINE.init(keeper.settings().machine.clone());
+    let wires = wires::new(
         machine,
         wires::Resources {
             rd: (p.TIM2, p.TIM1, p.PB10, p.PB11),
@@ -127,23 +128,9 @@ fn main() -> ! {
             ],
         },
     );
-    let ethernet = net::Resources {
-        eth: p.ETH,
-        sma: (p.ETH_SMA, p.PA2, p.PC1),
-        clock: (p.PA1, p.PA7),
-        rx: (p.PC4, p.PC5),
-        tx: (p.PG13, p.PB13, p.PG11),
-        rng: p.RNG,
-    };
-
-    let line = serial::Resources {
-        usart: p.USART2,
-        pins: (p.PD6, p.PD5, p.PD4),
-    };
-
     let start = Instant::now() + SETTLING;
     let timed = [PLANT.start(interrupt::UART7), DRIVE.start(interrupt::UART8)];
-    timed[0].spawn(watchdog::run(p.IWDG1).expect("first"));
+    timed[0].spawn(watch(p.IWDG1).expect("first"));
     let exchange = simulator::start(timed, start, machine, wires, started);
     let background = BACKGROUND.start(interrupt::SAI1);
     background.spawn(
@@ -151,12 +138,15 @@ fn main() -> ! {
             machine,
             exchange,
             Given {
-                panel,
-                ethernet,
-                network: settings.network,
-                line,
-                serial: settings.serial,
-                reset,
+                lamps,
+                ethernet: ethernet_pins!(p),
+                line: links::Line {
+                    usart: p.USART2,
+                    pins: (p.PD6, p.PD5, p.PD4),
+                },
+                store,
+                keeper,
+                why,
             },
         )
         .expect("first"),
@@ -167,25 +157,60 @@ fn main() -> ! {
     }
 }
 
-/// What the background gets of chip and settings.
-struct Given {
-    panel: Panel,
-    ethernet: net::Resources,
-    network: Network,
-    line: serial::Resources,
-    serial: Serial,
-    reset: &'static str,
+/// What the chip knows of its reset. Source: RM0433 rev. 8, section 8.7.37 (RCC_RSR).
+fn reset() -> Reset {
+    let flags = pac::RCC.rsr().read();
+    pac::RCC.rsr().modify(|w| w.set_rmvf(true));
+    // The pin's flag is set by every reset of the chip, so it says something only alone.
+    if flags.porrstf() || flags.borrstf() {
+        Reset::Power
+    } else if flags.iwdg1rstf() {
+        Reset::Watchdog
+    } else if flags.sftrstf() {
+        Reset::Program
+    } else {
+        Reset::Other
+    }
 }
 
-/// Everything that may wait: logic, panel, serial line, network.
+#[embassy_executor::task]
+async fn watch(device: Peri<'static, IWDG1>) {
+    watchdog::run(device).await
+}
+
+/// What the background gets of chip and settings.
+struct Given {
+    lamps: Lamps,
+    ethernet: ethernet::Pins,
+    line: links::Line,
+    store: Option<Store<Sectors>>,
+    keeper: Keeper,
+    why: &'static str,
+}
+
+/// Everything that may wait: logic, lamps, serial line, network.
 #[embassy_executor::task]
 async fn all_else(machine: &'static Machine, exchange: &'static Exchange, given: Given) {
+    static SERVED: StaticCell<LocalServed> = StaticCell::new();
+    static DESK: StaticCell<LocalDesk> = StaticCell::new();
+    let service = SERVED.init(LocalServed::new(machine)).service();
+    let board = Board {
+        name: "NUCLEO-H743ZI2",
+        version: env!("CARGO_PKG_VERSION"),
+        reset: given.why,
+    };
+    let (network, serial) = given.keeper.in_use();
+    let desk = &*DESK.init(LocalDesk::keeping(board, given.keeper));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
-    let service = simulator::service(machine);
-    let desk = simulator::desk(machine, given.reset);
     spawner.spawn(simulator::logic(machine, exchange, service, desk).expect("first"));
-    spawner.spawn(panel::run(given.panel, exchange, service).expect("first"));
-    serial::start(spawner, given.line, given.serial, service);
-    net::start(spawner, given.ethernet, given.network, service, desk);
+    if let Some(store) = given.store {
+        spawner.spawn(settings::keep(store, desk).expect("first"));
+    }
+    links::start_line(spawner, given.line, serial, service);
+    links::start_network(spawner, given.ethernet, network, service, desk);
+    given
+        .lamps
+        .run(exchange, service, || desk.is_undecided())
+        .await
 }

@@ -4,10 +4,15 @@
 //! neither waits for a bus. Copying code to ITCM would save the first activation's misses only.
 
 use core::mem::MaybeUninit;
+use core::ops::Range;
 
+use board_cortex_m::memory::keep_uncached;
 use cortex_m::Peripherals;
 use embassy_stm32::eth::PacketQueue;
+use embassy_stm32::flash::FLASH_BASE;
 use embassy_stm32::pac;
+
+use crate::settings::RANGE;
 
 /// Frames that wait, each way.
 pub type Queue = PacketQueue<4, 8>;
@@ -15,39 +20,21 @@ pub type Queue = PacketQueue<4, 8>;
 #[unsafe(link_section = ".sram_d2")]
 static mut QUEUE: MaybeUninit<Queue> = MaybeUninit::uninit();
 
-/// Switches the caches on, and SRAM1 to SRAM3, which stay out of them.
+/// Switches the caches on, and SRAM1 to SRAM3, which stay out of them, as the settings' flash does.
 pub fn prepare(core: &mut Peripherals) {
-    // Armv7-M architecture reference manual, B3.5: protected memory system.
-    const SRAM_D2: u32 = 0x3000_0000;
-    const REGION_VALID: u32 = 1 << 4;
-    const NEVER_EXECUTE: u32 = 1 << 28;
-    const FULL_ACCESS: u32 = 0b011 << 24;
-    // normal memory, shared, not cached
-    const NOT_CACHED: u32 = 0b001 << 19 | 1 << 18;
-    const SIZE_LOG2: u32 = 19;
-    const REGION_ENABLE: u32 = 1;
-    const DEFAULT_MAP_AND_ENABLE: u32 = 1 << 2 | 1;
+    const SRAM_D2: Range<u32> = 0x3000_0000..0x3008_0000;
+    const SETTINGS: Range<u32> = FLASH_BASE as u32 + RANGE.start..FLASH_BASE as u32 + RANGE.end;
 
     pac::RCC.ahb2enr().modify(|w| {
         w.set_sram1en(true);
         w.set_sram2en(true);
         w.set_sram3en(true);
     });
-    // SAFETY: nothing is in this memory yet, and all other memory keeps its default.
-    unsafe {
-        core.MPU.rbar.write(SRAM_D2 | REGION_VALID);
-        core.MPU
-            .rasr
-            .write(NEVER_EXECUTE | FULL_ACCESS | NOT_CACHED | (SIZE_LOG2 - 1) << 1 | REGION_ENABLE);
-        core.MPU.ctrl.write(DEFAULT_MAP_AND_ENABLE);
-    }
-    cortex_m::asm::dsb();
-    cortex_m::asm::isb();
+    // SAFETY: the caches are off, and the program is in other memories.
+    unsafe { keep_uncached(&core.MPU, &[SRAM_D2, SETTINGS]) };
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);
-    // counts cycles, for the task times
-    core.DCB.enable_trace();
-    core.DWT.enable_cycle_counter();
+    board_stm32::count_cycles(&mut core.DCB, &mut core.DWT);
 }
 
 /// The Ethernet's frames; called once, after [`prepare`].

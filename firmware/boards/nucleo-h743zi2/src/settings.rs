@@ -1,47 +1,75 @@
-//! The settings in the last two sectors of the flash.
+//! The last two sectors of the flash, where the settings are.
 //!
-//! They are in bank 2 and the program in bank 1, so that the core runs on while a sector is erased.
-//! Source: RM0433 rev. 8, section 4.3 (read while write).
+//! They are in bank 2 and the program in bank 1, so that the core runs on while a sector is erased; they are not cached,
+//! since what is written would be read as it was before. Source: RM0433 rev. 8, section 4.3.
+//!
+//! A word that a power cut has torn does not pass the flash's error correction, and reading it is a bus fault. So words
+//! are read with such faults ignored, and one that does not pass is taken for zeros, which the log passes over.
 
 use core::ops::Range;
 
-use embassy_embedded_hal::adapter::BlockingAsync;
-use embassy_stm32::Peri;
-use embassy_stm32::flash::{Bank2Region, Blocking, Flash};
+use board_cortex_m::memory::read_or_zeros;
+use board_cortex_m::net::LocalDesk;
+use embassy_stm32::flash::{Async, Error, FLASH_BASE, Flash, InterruptHandler, WRITE_SIZE};
 use embassy_stm32::peripherals::FLASH;
-use firmware::store::{Content, Settings, Store};
+use embassy_stm32::{Peri, bind_interrupts};
+use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use firmware::hmi;
+use firmware::store::Store;
 
-/// In bank 2; what `memory.x` leaves free.
-const RANGE: Range<u32> = 0xc_0000..0x10_0000;
+bind_interrupts!(struct Irqs {
+    FLASH => InterruptHandler;
+});
 
-/// The settings' store on this chip.
-pub type Settled = Store<BlockingAsync<Bank2Region<'static, Blocking>>>;
+/// From the flash's beginning; what `memory.x` leaves free.
+pub const RANGE: Range<u32> = 0x1c_0000..0x20_0000;
 
-/// The store, and what was in it; a held button empties it first.
-pub async fn open(flash: Peri<'static, FLASH>, reset: bool) -> (Option<Settled>, Settings) {
-    let bank = Flash::new_blocking(flash)
-        .into_blocking_regions()
-        .bank2_region;
-    let Some(mut store) = Store::new(BlockingAsync::new(bank), RANGE) else {
-        defmt::error!("no place for settings");
-        return (None, Settings::default());
-    };
-    if reset {
-        match store.discard().await {
-            Ok(()) => defmt::warn!("settings emptied by the button"),
-            Err(_) => defmt::error!("settings cannot be emptied"),
-        }
+/// The flash.
+pub struct Sectors(Flash<'static, Async>);
+
+impl Sectors {
+    /// Takes it.
+    pub fn new(flash: Peri<'static, FLASH>) -> Self {
+        Self(Flash::new(flash, Irqs))
     }
-    let settings = match store.load().await {
-        Content::Blank => Settings::default(),
-        Content::Settings(settings) => settings,
-        Content::Unusable(why) => {
-            defmt::error!(
-                "defaults, since the settings are of no use: {}",
-                defmt::Debug2Format(&why)
-            );
-            Settings::default()
+}
+
+impl ErrorType for Sectors {
+    type Error = Error;
+}
+
+impl ReadNorFlash for Sectors {
+    const READ_SIZE: usize = 1;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Error> {
+        if offset < RANGE.start || offset as usize + bytes.len() > RANGE.end as usize {
+            return Err(Error::Size);
         }
-    };
-    (Some(store), settings)
+        // SAFETY: flash, which reading does not change; a word is read within a microsecond.
+        unsafe { read_or_zeros::<WRITE_SIZE>(FLASH_BASE as u32 + offset, bytes) };
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.capacity()
+    }
+}
+
+impl NorFlash for Sectors {
+    const WRITE_SIZE: usize = WRITE_SIZE;
+    const ERASE_SIZE: usize = <Flash<Async> as NorFlash>::ERASE_SIZE;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
+        self.0.erase(from, to).await
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        self.0.write(offset, bytes).await
+    }
+}
+
+/// Keeps the settings, in the background.
+#[embassy_executor::task]
+pub async fn keep(mut store: Store<Sectors>, desk: &'static LocalDesk) {
+    hmi::keep(&mut store, desk).await;
 }

@@ -17,7 +17,8 @@ use heapless::Vec;
 
 use super::pdu::{Exception, PDU_MAX, Pdu, refuse};
 use super::{is_exception, response_delay, serve};
-use crate::link::Client;
+use crate::link::control::{Peer, Protocol};
+use crate::link::{Client, Service};
 
 const ADDRESS: usize = 1;
 const CHECKSUM: usize = 2;
@@ -327,6 +328,21 @@ fn count(counter: &mut u16) {
 /// Functions that change something, and so make sense as a broadcast.
 fn writes(function: u8) -> bool {
     matches!(function, 5 | 6 | 15 | 16 | 22 | 23)
+}
+
+/// Serves a line for good: what its driver reports, noise or an overrun, ends nothing.
+pub async fn serve_line<S, M>(mut port: S, service: Service<'_, M>, address: u8, gaps: Gaps)
+where
+    S: Read + Write,
+    M: RawMutex,
+{
+    let mut station = Station::new(address);
+    if let Some(client) = service.enter(Peer::Serial, Protocol::ModbusRtu) {
+        while session(&mut port, &client, &mut station, gaps)
+            .await
+            .is_err()
+        {}
+    }
 }
 
 /// Serves a line for good, or until it breaks.

@@ -1,5 +1,8 @@
 //! The end: what the firmware does when it cannot go on. It says why in the log and starts anew.
 
+// Fault handlers are unsafe to define.
+#![allow(unsafe_code)]
+
 use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, exception};
