@@ -383,6 +383,8 @@ impl<N: Number> Arithmetic for Traced<N> {
     type Rate = Self;
     type Sum = <N as Number>::Sum;
 
+    const POSITIVE_OF: f64 = 1.0;
+
     fn positive(self) -> Self {
         if self > Self::ZERO { self } else { Self::ZERO }
     }
@@ -407,6 +409,9 @@ impl<N: Number> Arithmetic for Traced<N> {
     fn no_rate() -> Self {
         Self::ZERO
     }
+    fn with_half(change: Self, other: Self) -> Self {
+        change + Self::of(0.5) * other
+    }
 }
 
 macro_rules! accumulator {
@@ -422,13 +427,13 @@ macro_rules! accumulator {
                 Sum::value(self)
             }
             fn after_sixth(&self, rate: Traced<N>) -> Traced<N> {
-                Sum::value(self) + rate
+                Sum::value(self) + Traced::of(0.5) * rate
             }
             fn after_half(&self, rate: Traced<N>) -> Traced<N> {
-                Sum::value(self) + Traced::of(3.0) * rate
+                Sum::value(self) + Traced::of(1.5) * rate
             }
             fn after_whole(&self, rate: Traced<N>) -> Traced<N> {
-                Sum::value(self) + Traced::of(6.0) * rate
+                Sum::value(self) + Traced::of(3.0) * rate
             }
             fn advance(&mut self, change: Traced<N>) {
                 Sum::add(self, change);

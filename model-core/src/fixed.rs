@@ -158,6 +158,8 @@ impl Arithmetic for Word {
     type Rate = Change;
     type Sum = Total;
 
+    const POSITIVE_OF: f64 = 1.0;
+
     #[inline(always)]
     fn positive(self) -> Self {
         let bits = self.bits();
@@ -200,6 +202,10 @@ impl Arithmetic for Word {
     fn no_rate() -> Change {
         Change(0)
     }
+    #[inline(always)]
+    fn with_half(Change(change): Change, Change(other): Change) -> Change {
+        Change(change.wrapping_add(other >> 1))
+    }
 }
 
 impl Total {
@@ -218,16 +224,16 @@ impl Accumulator<Word> for Total {
         Self::word(self.0)
     }
     #[inline(always)]
-    fn after_sixth(&self, Change(sixth): Change) -> Word {
-        Self::word(self.0.wrapping_add(sixth))
+    fn after_sixth(&self, Change(third): Change) -> Word {
+        Self::word(self.0.wrapping_add(third >> 1))
     }
     #[inline(always)]
-    fn after_half(&self, Change(sixth): Change) -> Word {
-        Self::word(self.0.wrapping_add(sixth.wrapping_mul(3)))
+    fn after_half(&self, Change(third): Change) -> Word {
+        Self::word(self.0.wrapping_add(third.wrapping_mul(3) >> 1))
     }
     #[inline(always)]
-    fn after_whole(&self, Change(sixth): Change) -> Word {
-        Self::word(self.0.wrapping_add(sixth.wrapping_mul(6)))
+    fn after_whole(&self, Change(third): Change) -> Word {
+        Self::word(self.0.wrapping_add(third.wrapping_mul(3)))
     }
     #[inline(always)]
     fn advance(&mut self, Change(change): Change) {

@@ -156,12 +156,16 @@ impl<R: Real> Sum<R> for Compensated<R> {
 pub trait Arithmetic: Ring {
     /// A factor between a quantity and what it changes another by.
     type Gain: Copy + Debug + Send + 'static;
-    /// What a state changes by in a sixth of a step.
+    /// What a state changes by in a third of a step.
     type Rate: Copy + Debug + Add<Output = Self::Rate> + Send + 'static;
     /// What a state is summed up in.
     type Sum: Accumulator<Self>;
 
-    /// max(0, x); of what is not a number, anything.
+    /// The share of a quantity that [`positive`](Self::positive) wants, a power of two. A coefficient can have it in it,
+    /// so that it costs nothing and changes no digit.
+    const POSITIVE_OF: f64;
+
+    /// max(0, x) of that share of x; of what is not a number, anything.
     fn positive(self) -> Self;
     /// 1 + ε
     fn stretch(strain: Self) -> Self;
@@ -177,6 +181,8 @@ pub trait Arithmetic: Ring {
     fn rate(self, gain: Self::Gain) -> Self::Rate;
     /// No change.
     fn no_rate() -> Self::Rate;
+    /// A change with half of another.
+    fn with_half(change: Self::Rate, other: Self::Rate) -> Self::Rate;
 }
 
 /// A running sum of the changes of a state.
@@ -243,12 +249,11 @@ macro_rules! floating {
             type Rate = Self;
             type Sum = $sum;
 
+            const POSITIVE_OF: f64 = 0.5;
+
             #[inline(always)]
             fn positive(self) -> Self {
-                let bits = self.to_bits().cast_signed();
-                // all ones below zero
-                let negative = bits >> (8 * size_of::<Self>() - 1);
-                Self::from_bits((bits & !negative).cast_unsigned())
+                self + self.abs()
             }
             #[inline(always)]
             fn stretch(strain: Self) -> Self {
@@ -278,6 +283,10 @@ macro_rules! floating {
             fn no_rate() -> Self {
                 0.0
             }
+            #[inline(always)]
+            fn with_half(change: Self, other: Self) -> Self {
+                change + 0.5 * other
+            }
         }
 
         impl Accumulator<$type> for $sum {
@@ -290,15 +299,15 @@ macro_rules! floating {
             }
             #[inline(always)]
             fn after_sixth(&self, rate: $type) -> $type {
-                Sum::value(self) + rate
+                Sum::value(self) + 0.5 * rate
             }
             #[inline(always)]
             fn after_half(&self, rate: $type) -> $type {
-                Sum::value(self) + 3.0 * rate
+                Sum::value(self) + 1.5 * rate
             }
             #[inline(always)]
             fn after_whole(&self, rate: $type) -> $type {
-                Sum::value(self) + 6.0 * rate
+                Sum::value(self) + 3.0 * rate
             }
             #[inline(always)]
             fn advance(&mut self, change: $type) {

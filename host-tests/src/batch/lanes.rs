@@ -120,16 +120,18 @@ impl Ring for Lanes {
     const ONE: Self = Self(f32x16::ONE);
 }
 
-/// As that of `f32`, operation by operation; only the maximum of 0 and what is not a number is another.
+/// As that of `f32`, operation by operation.
 impl Arithmetic for Lanes {
     type Gain = Self;
     type Rate = Self;
     type Sum = Compensated<Self>;
 
-    /// A comparison that lets through what is not a number, so that it shows in the end, see [`at_limit`].
+    const POSITIVE_OF: f64 = f32::POSITIVE_OF;
+
+    /// It lets through what is not a number, so that it shows in the end, see [`at_limit`].
     #[inline(always)]
     fn positive(self) -> Self {
-        Self(self.0.simd_le(f32x16::ZERO).select(f32x16::ZERO, self.0))
+        Self(self.0 + self.0.abs())
     }
     #[inline(always)]
     fn stretch(strain: Self) -> Self {
@@ -159,6 +161,10 @@ impl Arithmetic for Lanes {
     fn no_rate() -> Self {
         Self::ZERO
     }
+    #[inline(always)]
+    fn with_half(change: Self, other: Self) -> Self {
+        change + Self::all(0.5) * other
+    }
 }
 
 impl Accumulator<Lanes> for Compensated<Lanes> {
@@ -171,15 +177,15 @@ impl Accumulator<Lanes> for Compensated<Lanes> {
     }
     #[inline(always)]
     fn after_sixth(&self, rate: Lanes) -> Lanes {
-        self.value + rate
+        self.value + Lanes::all(0.5) * rate
     }
     #[inline(always)]
     fn after_half(&self, rate: Lanes) -> Lanes {
-        self.value + Lanes::all(3.0) * rate
+        self.value + Lanes::all(1.5) * rate
     }
     #[inline(always)]
     fn after_whole(&self, rate: Lanes) -> Lanes {
-        self.value + Lanes::all(6.0) * rate
+        self.value + Lanes::all(3.0) * rate
     }
     #[inline(always)]
     fn advance(&mut self, change: Lanes) {

@@ -16,8 +16,8 @@ in_both_scalars!(
     slack_does_not_push,
 );
 
-/// Rates are those for a sixth of a step: for a step of 6 s, those for a second.
-const SIX: f64 = 6.0;
+/// Rates are those for a third of a step: for a step of 3 s, those for a second.
+const THREE: f64 = 3.0;
 
 /// Strain of span `i` after `time` with all speeds held, by RK4 in steps of [`H`].
 fn follow<R: Float, const SPANS: usize>(
@@ -47,7 +47,7 @@ fn follow<R: Float, const SPANS: usize>(
 }
 
 fn spans<R: Float, const SPANS: usize>(m: &Machine) -> Spans<R, SPANS> {
-    Spans::new(&One(m, &Units::SI), SIX)
+    Spans::new(&One(m, &Units::SI), THREE)
 }
 
 /// With constant speeds 1/(1+ε) is an exact lag of L/V.
@@ -112,7 +112,7 @@ fn strain_is_exact_at_large_strains<R: Float>() {
     let mut m = Machine::news_8000();
     m.idle[0].span_m = 1.0;
     m.idle[1].span_m = 1.0;
-    let spans = Spans::<R, 2>::new(&One(&m, &Units::SI), SIX);
+    let spans = Spans::<R, 2>::new(&One(&m, &Units::SI), THREE);
     for (v, expected) in [([1.0, 1.01], 0.0605), ([1.01, 1.0], 0.0396)] {
         // the first span keeps its 5 %: V_1 = 1.05·V_in
         let v_in = v[0] / 1.05;

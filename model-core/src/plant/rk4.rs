@@ -77,12 +77,12 @@ impl<T: Copy, const SPANS: usize, const APART: usize> State<T, SPANS, APART> {
 
 /// A system of differential equations.
 pub trait System<A: Arithmetic, const SPANS: usize, const APART: usize> {
-    /// Rates of all variables in a state, for a sixth of the step.
+    /// Rates of all variables in a state, for a third of the step.
     fn rates(&self, x: &State<A, SPANS, APART>) -> State<A::Rate, SPANS, APART>;
 }
 
 /// Advances the sums by x(t + h) = x + h/6·(k1 + 2·(k2 + k3) + k4), with `k1` the rates at the start; rates come for a
-/// sixth of the step.
+/// third of the step, which weighs those within the step by 1.
 ///
 /// Gives the mean of the last speed over the step. For its integral, the way, the method has h·(v + k1 + k2 + k3) with
 /// the k of the speed: no stage needs to compute it.
@@ -92,15 +92,16 @@ pub fn advance<A: Arithmetic, const SPANS: usize, const APART: usize>(
     k1: State<A::Rate, SPANS, APART>,
     system: &impl System<A, SPANS, APART>,
 ) -> A {
-    let k2 = system.rates(&sums.zip(&k1, |sum, k| sum.after_half(k)));
-    let k3 = system.rates(&sums.zip(&k2, |sum, k| sum.after_half(k)));
-    // what is added up by now need not be kept through the last rates
-    let inner = k2.zip(&k3, |a, b| a + b);
     let last = SPANS - 1;
-    let mean = sums.v[last].after_sixth(k1.v[last] + inner.v[last]);
-    let most = k1.zip(&inner, |a, b| a + (b + b));
+    let k2 = system.rates(&sums.zip(&k1, |sum, k| sum.after_half(k)));
+    // what is added up by now need not be kept through the next rates
+    let way = k1.v[last] + k2.v[last];
+    let change = k2.zip(&k1, A::with_half);
+    let k3 = system.rates(&sums.zip(&k2, |sum, k| sum.after_half(k)));
+    let mean = sums.v[last].after_sixth(way + k3.v[last]);
+    let change = change.zip(&k3, |a, b| a + b);
     let k4 = system.rates(&sums.zip(&k3, |sum, k| sum.after_whole(k)));
-    let change = most.zip(&k4, |a, b| a + b);
+    let change = change.zip(&k4, A::with_half);
     *sums = sums.zip(&change, |mut sum, change| {
         sum.advance(change);
         sum

@@ -9,7 +9,7 @@ use crate::real::Arithmetic;
 /// An idle roll, or several of one radius, by its mass at the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Idle<A: Arithmetic> {
-    /// h/6·R²/J.
+    /// h/3·R²/J.
     per_mass: A::Gain,
     /// Surface friction c, N·s/m.
     friction: A,
@@ -19,7 +19,7 @@ impl<A: Arithmetic> Idle<A> {
     /// Idle roll `i` of the machines, which must have it, for steps of `h` seconds.
     pub fn new(machines: &impl Machines<A>, i: usize, h: f64) -> Self {
         Self {
-            per_mass: machines.gain(|m, u| h / 6.0 * u.force / (m.idle[i].mass_kg() * u.speed)),
+            per_mass: machines.gain(|m, u| h / 3.0 * u.force / (m.idle[i].mass_kg() * u.speed)),
             friction: machines.coefficient(|m, u| m.idle[i].friction_n_s_m * u.speed / u.force),
         }
     }
@@ -48,16 +48,16 @@ pub struct Unwind<A: Arithmetic> {
     inertia_offset: A,
     /// Surface friction c, N·s/m.
     friction: A,
-    /// h/6 over 1 kg·m².
+    /// h/3 over 1 kg·m².
     per_inertia: A::Gain,
-    /// −h/6·z/2π.
+    /// −h/3·z/2π.
     layer: A::Gain,
 }
 
 impl<A: Arithmetic> Unwind<A> {
     /// From the machines' description, for steps of `h` seconds.
     pub fn new(machines: &impl Machines<A>, h: f64) -> Self {
-        let sixth = h / 6.0;
+        let third = h / 3.0;
         let layer = |m: &Machine| m.web.caliper_m / core::f64::consts::TAU;
         Self {
             inertia_factor: machines.coefficient(|m, u| {
@@ -66,8 +66,8 @@ impl<A: Arithmetic> Unwind<A> {
             }),
             inertia_offset: machines.coefficient(|m, u| m.parent_roll_offset() / u.inertia),
             friction: machines.coefficient(|m, u| m.parent_roll.friction_n_s_m * u.speed / u.force),
-            per_inertia: machines.gain(|_, u| sixth * u.torque() / (u.inertia * u.omega())),
-            layer: machines.gain(|m, u| -(sixth * layer(m) * u.omega() / u.r_uw)),
+            per_inertia: machines.gain(|_, u| third * u.torque() / (u.inertia * u.omega())),
+            layer: machines.gain(|m, u| -(third * layer(m) * u.omega() / u.r_uw)),
         }
     }
 

@@ -9,18 +9,20 @@ use crate::real::Arithmetic;
 /// The coefficients of all spans, which carry the same web.
 #[derive(Clone, Copy, Debug)]
 pub struct Spans<A: Arithmetic, const SPANS: usize> {
-    /// h/6·1/L of each span.
+    /// h/3·1/L of each span.
     per_length: [A::Gain; SPANS],
     /// EA, N.
     stiffness: A,
-    /// d/L = EA·τ_v/L of each span, N·s/m.
-    viscosity: [A; SPANS],
+    /// The share of it that a tension before it is limited to pull wants …
+    elastic: A,
+    /// … and that of d/L = EA·τ_v/L of each span, N·s/m.
+    viscous: [A; SPANS],
 }
 
 /// Change of strain and tension of all spans at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Web<A: Arithmetic, const SPANS: usize> {
-    /// ε̇, for a sixth of a step.
+    /// ε̇, for a third of a step.
     pub strain_rate: [A::Rate; SPANS],
     /// t, N, total across the width.
     pub tension: [A; SPANS],
@@ -43,12 +45,14 @@ impl<A: Arithmetic, const SPANS: usize> Spans<A, SPANS> {
         let stiffness = |m: &Machine| m.web.stiffness_n_m * m.web.width_m;
         Self {
             per_length: core::array::from_fn(|i| {
-                machines.gain(|m, u| h / 6.0 * u.speed / (m.span_m(i) * u.strain))
+                machines.gain(|m, u| h / 3.0 * u.speed / (m.span_m(i) * u.strain))
             }),
             stiffness: machines.coefficient(|m, u| stiffness(m) * u.strain / u.force),
-            viscosity: core::array::from_fn(|i| {
+            elastic: machines
+                .coefficient(|m, u| A::POSITIVE_OF * stiffness(m) * u.strain / u.force),
+            viscous: core::array::from_fn(|i| {
                 let viscosity = |m: &Machine| stiffness(m) * m.web.retardation_s / m.span_m(i);
-                machines.coefficient(|m, u| viscosity(m) * u.speed / u.force)
+                machines.coefficient(|m, u| A::POSITIVE_OF * viscosity(m) * u.speed / u.force)
             }),
         }
     }
@@ -81,8 +85,7 @@ impl<A: Arithmetic, const SPANS: usize> Spans<A, SPANS> {
                 (draw + (v[i].strained(strain_up) - less)) * stretch.over(stretch_up)
             };
             web.strain_rate[i] = flow.rate(self.per_length[i]);
-            web.tension[i] =
-                (strain[i].elastic(self.stiffness) + self.viscosity[i] * flow).positive();
+            web.tension[i] = (strain[i].elastic(self.elastic) + self.viscous[i] * flow).positive();
             (v_up, strain_up, stretch_up) = (v[i], strain[i], stretch);
         }
         web

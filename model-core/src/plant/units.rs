@@ -116,7 +116,7 @@ impl Units {
     pub fn fit<R: Scalar>(&self, machine: &Machine, h: f64) -> Result<(), MachineError> {
         let web = &machine.web;
         // the coefficients of a span of 1 m, see `Spans`
-        let change = h / 6.0 * self.speed / self.strain / R::LARGEST_GAIN;
+        let change = h / 3.0 * self.speed / self.strain / R::LARGEST_GAIN;
         let viscous = web.stiffness_n_m * web.width_m * web.retardation_s * self.speed
             / self.force
             / R::LARGEST;

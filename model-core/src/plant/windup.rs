@@ -49,9 +49,9 @@ pub struct Windup<A: Arithmetic> {
     core: A,
     /// ½·π·ρ·W·z/2π = ¼·g·W, kg/m.
     growth: A,
-    /// h/6·z/(2π·R_core).
+    /// h/3·z/(2π·R_core).
     layer: A::Gain,
-    /// h/6 over 1 kg, and over the mass of each roll.
+    /// h/3 over 1 kg, and over the mass of each roll.
     per_mass: A::Gain,
     per_roll: [A::Gain; ROLLS],
 }
@@ -127,7 +127,7 @@ pub enum Nip<T> {
 impl<A: Arithmetic> Windup<A> {
     /// From the machines' description, for steps of `h` seconds.
     pub fn new(machines: &impl Machines<A>, h: f64) -> Self {
-        let sixth = h / 6.0;
+        let third = h / 3.0;
         let friction =
             |c: fn(&Machine) -> f64| machines.coefficient(move |m, u| c(m) * u.speed / u.force);
         let layer = |m: &Machine| m.web.caliper_m / core::f64::consts::TAU;
@@ -150,10 +150,10 @@ impl<A: Arithmetic> Windup<A> {
                 .coefficient(|m, u| m.web.inertia_factor() * u.r_wu * u.r_wu / u.mass),
             core: machines.coefficient(|m, u| core(m) / u.r_wu),
             growth: machines.coefficient(|m, u| growth(m) * u.speed * u.speed / u.force),
-            layer: machines.gain(|m, u| sixth * layer(m) * u.speed / (core(m) * u.r_wu)),
-            per_mass: machines.gain(|_, u| sixth * u.force / (u.mass * u.speed)),
+            layer: machines.gain(|m, u| third * layer(m) * u.speed / (core(m) * u.r_wu)),
+            per_mass: machines.gain(|_, u| third * u.force / (u.mass * u.speed)),
             per_roll: each(|j| {
-                machines.gain(|m, u| sixth * u.force / (roll(m, j).mass_kg() * u.speed))
+                machines.gain(|m, u| third * u.force / (roll(m, j).mass_kg() * u.speed))
             }),
         }
     }
