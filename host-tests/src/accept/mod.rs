@@ -2,8 +2,10 @@
 //!
 //! Not here: the winder. A run plays the operator and what breaks ([`course`]) on a simulator with a PLC ([`world`]),
 //! keeps all that was seen ([`run`]), judges it by a table of checks ([`checks`]) and writes what came of it
-//! ([`report`]). [`seeds`] are errors that a program may have, to see that they are found.
+//! ([`report`]). [`seeds`] are errors that a program may have, to see that they are found; [`wired`] runs a program as a PLC of its own, and
+//! [`attend`] waits for runs that are asked for on the page.
 
+pub mod attend;
 pub mod checks;
 pub mod controller;
 pub mod course;
@@ -11,6 +13,7 @@ pub mod matrix;
 pub mod report;
 pub mod run;
 pub mod seeds;
+pub mod wired;
 pub mod world;
 
 use checks::{CHECKS, Check, Verdict};

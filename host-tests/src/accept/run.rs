@@ -131,7 +131,9 @@ pub fn run(world: &mut dyn World) -> Course {
         course: Course::default(),
         beat: None,
     };
-    for (name, episode) in EPISODES {
+    for (i, (name, episode)) in EPISODES.into_iter().enumerate() {
+        let share = i as f64 / EPISODES.len() as f64;
+        run.world.begins(name, share);
         let from = run.course.samples.len();
         let done = episode(&mut run);
         let (stuck, over) = match done {

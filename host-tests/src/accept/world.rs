@@ -46,6 +46,9 @@ pub trait World {
     /// Lets a little time go on, with these words of the simulator's own: desk and faults.
     fn look(&mut self, own: &Commands) -> Result<Look>;
 
+    /// An episode of the course begins, when so much of the course is over, 0 to 1.
+    fn begins(&mut self, _episode: &'static str, _share: f64) {}
+
     /// Asks a person at the PLC's own desk to do something, where there is one.
     fn prompt(&mut self, _what: &str) -> Result<()> {
         Ok(())
@@ -59,10 +62,13 @@ pub trait World {
 
 /// The words of the commands that are the simulator's own, as stretches of the block.
 pub fn own_words() -> Vec<(usize, usize)> {
+    stretches(|s| s.direction == Direction::Command && s.section == Section::Simulator)
+}
+
+/// The words of some signals of a block, as stretches: first word and number of words.
+pub fn stretches(of: impl Fn(&image::Signal) -> bool) -> Vec<(usize, usize)> {
     let mut stretches: Vec<(usize, usize)> = Vec::new();
-    let own =
-        |s: &&image::Signal| s.direction == Direction::Command && s.section == Section::Simulator;
-    for signal in SIGNALS.iter().filter(own) {
+    for signal in SIGNALS.iter().filter(|signal| of(signal)) {
         let (from, words) = (usize::from(signal.word), usize::from(signal.kind.words()));
         match stretches.last_mut() {
             Some((first, many)) if *first + *many == from => *many += words,
@@ -133,15 +139,15 @@ pub struct Live {
 }
 
 impl Live {
-    /// Connects; `asks` prompts a person for what the desk's words would say.
-    pub fn connect(address: SocketAddr, asks: bool) -> Result<Self> {
+    /// Connects; where lines are typed, a person is asked for what the desk's words would say.
+    pub fn connect(address: SocketAddr, typed: Option<Receiver<String>>) -> Result<Self> {
         Ok(Self {
             link: Link::connect(address)?,
             stretches: own_words(),
             written: None,
             first: None,
             last: (0, Instant::now()),
-            typed: asks.then(typed),
+            typed,
         })
     }
 }
@@ -202,7 +208,7 @@ impl World for Live {
 }
 
 /// Lines from the keyboard, read beside.
-fn typed() -> Receiver<String> {
+pub fn typed() -> Receiver<String> {
     let (send, receive) = mpsc::channel();
     thread::spawn(move || {
         for line in std::io::stdin().lines().map_while(std::io::Result::ok) {

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use host_tests::command::{
-    accept, bench, conformance, demo, figures, flash, fuzz, lesson, machine, replay, run, scenario,
-    signals, size, test, timing,
+    accept, bench, conformance, demo, figures, flash, fuzz, lesson, machine, plc, replay, run,
+    scenario, signals, size, test, timing,
 };
 use host_tests::interrupt::{self, Interrupted};
 use host_tests::plant;
@@ -40,6 +40,10 @@ enum Command {
     ///
     /// Exit status 1: something was found, or could not be seen.
     Accept(accept::Args),
+    /// Run a program in Structured Text as a winder PLC of its own, wired to a running simulator
+    ///
+    /// Without a program, the reference winder PLC. Ends with Ctrl-C.
+    Plc(plc::Args),
     /// Learn to operate the winder: a goal, hints and a score, at the desk of the PLC that ships
     ///
     /// Without a name, lists the lessons. Exit status 1: not all points.
@@ -100,6 +104,7 @@ fn run(cli: Cli) -> Result<ExitCode> {
         Command::Machine(args) => machine::main(&args),
         Command::Scenario(args) => scenario::main(&args),
         Command::Accept(args) => interrupt::install().and_then(|()| accept::main(&args)),
+        Command::Plc(args) => interrupt::install().and_then(|()| plc::main(&args)),
         Command::Lesson(args) => interrupt::install().and_then(|()| lesson::main(&args)),
         Command::Replay(args) => replay::main(&args),
         Command::Figures(args) => figures::main(&args),

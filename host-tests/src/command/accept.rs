@@ -1,16 +1,18 @@
 //! `winder accept`
 
+use std::env;
 use std::fs;
 use std::io::{self, Write};
-use std::net::ToSocketAddrs;
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use model_core::machine::Machine;
 
+use crate::accept::attend::Page;
 use crate::accept::controller::{Controller, StPlc};
-use crate::accept::world::{Live, Lockstep};
+use crate::accept::world::{self, Live, Lockstep};
 use crate::accept::{Outcome, accept, matrix};
 
 /// Which PLC, and where the report goes.
@@ -26,6 +28,15 @@ pub struct Args {
     /// Say what to do at the PLC's own desk, where it does not read the simulator's
     #[arg(long, conflicts_with = "program")]
     ask: bool,
+    /// Wait for runs that are asked for on the simulator's page, at this address; its password is read from
+    /// WINDER_PASSWORD
+    #[arg(
+        long,
+        value_name = "http://HOST:PORT",
+        requires = "address",
+        conflicts_with = "ask"
+    )]
+    attend: Option<String>,
     /// Run the reference program with each seeded error, and compare which check finds which
     #[arg(long)]
     matrix: bool,
@@ -44,6 +55,9 @@ pub struct Args {
 pub fn main(args: &Args) -> Result<ExitCode> {
     if args.matrix {
         return compare(args.bless);
+    }
+    if let (Some(page), Some(address)) = (&args.attend, &args.address) {
+        return attend(page, address, &args.out);
     }
     let (what, outcome) = match (&args.program, &args.address) {
         (Some(file), _) => program(file)?,
@@ -113,14 +127,39 @@ fn program(file: &Path) -> Result<(String, Outcome)> {
     Ok((what.into_owned(), outcome))
 }
 
-fn live(address: &str, ask: bool) -> Result<(String, Outcome)> {
+/// Runs what is asked for on the page, until Ctrl-C.
+fn attend(page: &str, address: &str, out: &Path) -> Result<ExitCode> {
+    let password = env::var("WINDER_PASSWORD").context(
+        "the page's password is not there: set WINDER_PASSWORD to what was chosen on the page",
+    )?;
+    let page = Page::log_in(page, &password)?;
+    let place = resolve(address)?;
+    println!("waiting for a request on the page");
+    loop {
+        let (request, outcome) = page.attend(place)?;
+        write(&outcome, &what(address), out)?;
+        let report = out.join("accept.html");
+        println!(
+            "request {request}: {}; {}",
+            outcome.summary(),
+            report.display()
+        );
+    }
+}
+
+fn resolve(address: &str) -> Result<SocketAddr> {
     let wrong = || format!("{address} is not HOST:PORT");
     let found = address.to_socket_addrs().with_context(wrong)?.next();
-    let mut world = Live::connect(found.with_context(wrong)?, ask)?;
-    Ok((
-        format!("PLC at the simulator {address}"),
-        accept(&mut world),
-    ))
+    found.with_context(wrong)
+}
+
+fn what(address: &str) -> String {
+    format!("PLC at the simulator {address}")
+}
+
+fn live(address: &str, ask: bool) -> Result<(String, Outcome)> {
+    let mut world = Live::connect(resolve(address)?, ask.then(world::typed))?;
+    Ok((what(address), accept(&mut world)))
 }
 
 fn write(outcome: &Outcome, what: &str, out: &Path) -> Result<()> {

@@ -9,6 +9,7 @@ pub mod flash;
 pub mod fuzz;
 pub mod lesson;
 pub mod machine;
+pub mod plc;
 pub mod replay;
 pub mod run;
 pub mod scenario;
