@@ -10,7 +10,7 @@
 //! | 0x10 | `TIM3`, the time driver | wakes the tasks that are due; would only interrupt the plant for tasks that wait for it anyway |
 //! | 0x10 | `UART7`, no device's | the plant, then the wires |
 //! | 0x20 | `UART8`, no device's | the regulators |
-//! | 0x30 | `ETH`, `USART2` | wake the link's tasks |
+//! | 0x30 | `ETH`, `USART2`, `FLASH`, `RNG` | wake the tasks of links and settings; `RNG` never comes |
 //! | 0x30 | `SAI1`, no device's | everything else |
 //!
 //! What they share is a mailbox, which keeps no interrupt off.
@@ -98,6 +98,7 @@ fn main() -> ! {
         (interrupt::UART8, Priority::P2),
         (interrupt::ETH, Priority::P3),
         (interrupt::USART2, Priority::P3),
+        (interrupt::RNG, Priority::P3),
         (interrupt::FLASH, Priority::P3),
         (interrupt::SAI1, Priority::P3),
     ] {

@@ -110,7 +110,9 @@ async fn run(runner: Runner<'static, Device>) -> ! {
 #[embassy_executor::task]
 async fn fall_back(stack: Stack<'static>) -> ! {
     net::fall_back(stack, |address| {
-        defmt::info!("address {}", defmt::Display2Format(&address));
+        // As bytes: interrupts are off for as long as a line of the log is written.
+        let (bytes, prefix) = (address.address().octets(), address.prefix_len());
+        defmt::info!("address {=[u8; 4]}/{=u8}", bytes, prefix);
     })
     .await
 }
