@@ -13,7 +13,7 @@ use firmware::SPANS;
 use firmware::hmi::desk::{AtDesk, Board};
 use firmware::life::Started;
 use firmware::store::{Keeper, Store};
-use firmware::tasks;
+use firmware::tasks::{self, Hands};
 use model_core::drive::Drive;
 use model_core::logic::Logic;
 use model_core::machine::Machine;
@@ -104,7 +104,14 @@ async fn logic(
 ) {
     let control = service.control;
     let mut at_desk = AtDesk { control, desk };
-    let mut logic = Logic::new(machine);
-    let image = service.image;
-    tasks::logic::<Traced, _, _>(&mut logic, exchange, image, &mut Log, &mut at_desk).await;
+    let (mut logic, mut hands) = (Logic::new(machine), Hands::default());
+    tasks::logic::<Traced, _, _>(
+        &mut logic,
+        exchange,
+        service.image,
+        &mut Log,
+        &mut at_desk,
+        Some(&mut hands),
+    )
+    .await;
 }

@@ -70,5 +70,6 @@ pub async fn background(exchange: &'static Exchange, pins: ethernet::Pins) {
 #[embassy_executor::task]
 async fn logic(exchange: &'static Exchange, service: LocalService) {
     let mut logic = Logic::new(&machine());
-    tasks::logic::<Cycles, _, _>(&mut logic, exchange, service.image, &mut Log, &mut ()).await;
+    let image = service.image;
+    tasks::logic::<Cycles, _, _>(&mut logic, exchange, image, &mut Log, &mut (), None).await;
 }
