@@ -75,14 +75,14 @@ pub async fn background(machine: &'static Machine, exchange: &'static Exchange, 
     static SERVED: StaticCell<LocalServed> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
 
-    let service = SERVED.init(LocalServed::new(machine)).service();
+    let service = SERVED.init_with(|| LocalServed::new(machine)).service();
     let board = Board {
         name: "Cortex-M in QEMU (mps2)",
         version: env!("CARGO_PKG_VERSION"),
         reset: Restart::TEXTS[usize::from(given.started.why.number())],
     };
     let (_, line) = given.keeper.in_use();
-    let desk = &*DESK.init(LocalDesk::keeping(board, given.keeper));
+    let desk = &*DESK.init_with(|| LocalDesk::keeping(board, given.keeper));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(machine, exchange, service, desk).expect("first"));

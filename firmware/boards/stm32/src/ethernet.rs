@@ -2,6 +2,11 @@
 //!
 //! Does not know what is said on a connection. An unplugged cable stops nothing: the address comes when the cable does.
 
+// What is initialized where it is.
+#![allow(unsafe_code)]
+
+use core::mem::MaybeUninit;
+
 use embassy_executor::Spawner;
 use embassy_net::{Config, Runner, Stack, StackResources};
 use embassy_stm32::eth::{self, Ethernet, GenericPhy, PacketQueue, Sma};
@@ -63,6 +68,15 @@ macro_rules! ethernet_pins {
             rng: $p.RNG,
         }
     };
+}
+
+/// Frames that wait, where they are: they are too many for a stack.
+pub fn frames<const TX: usize, const RX: usize>(
+    place: &'static mut MaybeUninit<PacketQueue<TX, RX>>,
+) -> &'static mut PacketQueue<TX, RX> {
+    PacketQueue::init(place);
+    // SAFETY: the line above has initialized all of it.
+    unsafe { place.assume_init_mut() }
 }
 
 /// Starts the network, with frames where the Ethernet's DMA reaches them. Runs in the background, where everything of
