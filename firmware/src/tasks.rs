@@ -79,33 +79,6 @@ impl<T> Hatch<T> {
         }
     }
 
-    /// The task comes by, in this activation: leaves its part, or gets another.
-    fn pass(&self, activation: u32, own: impl FnOnce() -> T) -> Option<T> {
-        if !self.open.load(Ordering::Acquire) {
-            return None;
-        }
-        let mut place = self.handing.try_borrow_mut().ok()?;
-        let due = |at: u32| activation.wrapping_sub(at).cast_signed() >= 0;
-        match *place {
-            Handing::Take { at } if due(at) => {
-                self.open.store(false, Ordering::Relaxed);
-                *place = Handing::Taken {
-                    at: activation,
-                    part: own(),
-                };
-                None
-            }
-            Handing::Put { at, .. } if due(at) => {
-                self.open.store(false, Ordering::Relaxed);
-                match mem::replace(&mut *place, Handing::Nothing) {
-                    Handing::Put { part, .. } => Some(part),
-                    _ => None,
-                }
-            }
-            _ => None,
-        }
-    }
-
     /// What the task has left, in exactly this activation.
     fn taken(&self, at: u32) -> Option<T> {
         let mut place = self.handing.try_borrow_mut().ok()?;
@@ -113,6 +86,43 @@ impl<T> Hatch<T> {
             Handing::Taken { at: then, part } if then == at => Some(part),
             _ => None,
         }
+    }
+}
+
+impl<P: Clone, O: Copy> Hatch<(P, O)> {
+    /// The task comes by, in this activation: leaves its part with what goes with it, or goes on with others.
+    fn pass(&self, activation: u32, own: &mut P, with: &Mailbox<O>) {
+        if self.open.load(Ordering::Acquire) {
+            self.hand(activation, own, with);
+        }
+    }
+
+    /// Apart from the task, whose stack would have room for all of it at all times.
+    #[cold]
+    #[inline(never)]
+    fn hand(&self, activation: u32, own: &mut P, with: &Mailbox<O>) {
+        let Ok(mut place) = self.handing.try_borrow_mut() else {
+            return;
+        };
+        let due = |at: u32| activation.wrapping_sub(at).cast_signed() >= 0;
+        match *place {
+            Handing::Take { at } if due(at) => {
+                *place = Handing::Taken {
+                    at: activation,
+                    part: (own.clone(), with.get()),
+                };
+            }
+            Handing::Put {
+                at,
+                part: (ref other, value),
+            } if due(at) => {
+                own.clone_from(other);
+                with.set(value);
+                *place = Handing::Nothing;
+            }
+            _ => return,
+        }
+        self.open.store(false, Ordering::Relaxed);
     }
 }
 
@@ -293,11 +303,8 @@ pub async fn plant<W: Stopwatch, R: Scalar>(
     loop {
         rate.next().await;
         rate.begin();
-        let own = || (plant.clone(), exchange.actuators.get());
-        if let Some((other, actuators)) = exchange.plant_hatch.pass(number, own) {
-            *plant = other;
-            exchange.actuators.set(actuators);
-        }
+        let hatch = &exchange.plant_hatch;
+        hatch.pass(number, plant, &exchange.actuators);
         number = number.wrapping_add(1);
         let seen = exchange.actuators.look(|actuators| plant.tick(actuators));
         exchange.measurements.set(seen);
@@ -321,11 +328,8 @@ pub async fn drive<W: Stopwatch, R: Scalar>(
     loop {
         rate.next().await;
         rate.begin();
-        let own = || (*drive, exchange.command.get());
-        if let Some((other, command)) = exchange.drive_hatch.pass(number, own) {
-            *drive = other;
-            exchange.command.set(command);
-        }
+        let hatch = &exchange.drive_hatch;
+        hatch.pass(number, drive, &exchange.command);
         let Exchange {
             measurements,
             command,
@@ -380,13 +384,31 @@ enum Change<R: Scalar> {
     },
 }
 
-/// The logic's task: modes, interlocks and the process image, once a drive cycle.
+/// What changes hands at an attendant's order, and what is kept of it. As large as the simulator: a board whose attendant
+/// orders nothing has none.
+pub struct Hands<R: Scalar> {
+    change: Option<Change<R>>,
+    kept: Option<State<R>>,
+}
+
+impl<R: Scalar> Default for Hands<R> {
+    /// Nothing is under way.
+    fn default() -> Self {
+        Self {
+            change: None,
+            kept: None,
+        }
+    }
+}
+
+/// The logic's task: modes, interlocks and the process image, once a drive cycle. Without hands nothing is ordered.
 pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
     logic: &mut Logic<R::Si>,
     exchange: &Exchange<R>,
     image: &ImageCell<M>,
     journal: &mut impl Journal,
     attendant: &mut impl Attendant,
+    mut hands: Option<&mut Hands<R>>,
 ) -> ! {
     if exchange.started.why.is_by_itself() {
         logic.restarted();
@@ -395,7 +417,6 @@ pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
     let times = &exchange.logic_times;
     let mut next = 0;
     let mut reset = Edge::default();
-    let (mut change, mut kept) = (None, None);
     loop {
         exchange.cycle_from(next).await;
         let began = W::count();
@@ -408,27 +429,9 @@ pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
 
         let snapshot = image.lock(|image| {
             let image = &mut *image.borrow_mut();
-            if let Some(Change::Take {
-                cycle: last,
-                rest: Some((_, then)),
-            }) = &change
-                && is_after(cycle.number, *last)
-            {
-                // Told already, though plant and regulators may have been late: then once more.
-                attendant.done(cycle.number, Done::Kept, then);
+            if let Some(hands) = hands.as_deref_mut().filter(|hands| hands.is_busy()) {
+                hands.before(cycle.number, logic, image, attendant);
             }
-            change = match change.take() {
-                Some(Change::Put {
-                    cycle: last,
-                    logic: other,
-                    image: then,
-                }) if is_after(cycle.number, last) => {
-                    (*logic, *image) = (other, then);
-                    attendant.done(cycle.number, Done::GoesOn, image);
-                    None
-                }
-                other => other,
-            };
             attendant.before(cycle.number, image);
             let commands = exchange.inputs.get().act_on(&image.commands);
             let command = logic_tick(
@@ -443,15 +446,15 @@ pub async fn logic<W: Stopwatch, R: Scalar, M: RawMutex>(
             exchange.report_times::<W>(&mut image.feedback);
             exchange.outputs.set(Outputs::of(&image.feedback));
             attendant.after(cycle.number, image);
-            if let Some(Change::Take { cycle: last, rest }) = &mut change
-                && *last == cycle.number
-            {
-                *rest = Some((logic.clone(), *image));
+            if let Some(hands) = hands.as_deref_mut().filter(|hands| hands.is_busy()) {
+                hands.after(cycle.number, logic, image);
             }
             Image { commands, ..*image }
         });
         observer.look(cycle.number, &snapshot, journal);
-        change = exchange.change(change, &mut kept, cycle.number, attendant);
+        if let Some(hands) = hands.as_deref_mut() {
+            hands.go_on(exchange, cycle.number, attendant);
+        }
         times.activation(W::count().wrapping_sub(began), late);
         let word = snapshot.commands.word(&image::WINDER_COMMAND);
         if reset.rises(word & command::RESET_TIMES != 0) {
@@ -465,49 +468,97 @@ const fn is_after(cycle: u32, other: u32) -> bool {
     cycle.wrapping_sub(other).cast_signed() > 0
 }
 
-impl<R: Scalar> Exchange<R> {
-    /// Moves a change of hands on after a drive cycle, or begins one.
-    fn change(
-        &self,
-        change: Option<Change<R>>,
-        kept: &mut Option<State<R>>,
+// Apart from the logic's task, whose stack would have room for all of it at all times.
+impl<R: Scalar> Hands<R> {
+    fn is_busy(&self) -> bool {
+        self.change.is_some()
+    }
+
+    /// Before a drive cycle of the logic: it may go on from another state.
+    #[cold]
+    #[inline(never)]
+    fn before(
+        &mut self,
         now: u32,
+        logic: &mut Logic<R::Si>,
+        image: &mut Image,
         attendant: &mut impl Attendant,
-    ) -> Option<Change<R>> {
-        match change {
-            Some(Change::Take { cycle, rest }) if is_after(now, cycle) => {
-                let first = cycle.wrapping_add(1);
-                let plant = self.plant_hatch.taken(plant_after(cycle));
-                let drive = self.drive_hatch.taken(first);
-                if let (Some((plant, actuators)), Some((drive, command)), Some((logic, image))) =
-                    (plant, drive, rest)
-                {
-                    *kept = Some(State {
-                        plant,
-                        drive,
-                        logic,
-                        actuators,
-                        command,
-                        image,
-                        odd: is_odd(cycle),
-                    });
-                    return None;
-                }
-                // Somebody was late, and the parts are not of one moment: once more.
-                Some(self.take(now))
+    ) {
+        match &self.change {
+            Some(Change::Take {
+                cycle,
+                rest: Some((_, then)),
+            }) if is_after(now, *cycle) => {
+                // Told already, though plant and regulators may have been late: then once more.
+                attendant.done(now, Done::Kept, then);
             }
-            Some(under_way) => Some(under_way),
-            None => match attendant.order()? {
-                Order::Keep => Some(self.take(now)),
-                Order::Restore => kept.clone().map(|state| self.put(now, state)),
-                Order::Rebuild(machine) => {
-                    let state = State::fresh(&machine).ok()?;
-                    Some(self.put(now, state))
-                }
-            },
+            Some(Change::Put {
+                cycle,
+                logic: other,
+                image: then,
+            }) if is_after(now, *cycle) => {
+                logic.clone_from(other);
+                *image = *then;
+                attendant.done(now, Done::GoesOn, image);
+                self.change = None;
+            }
+            _ => {}
         }
     }
 
+    /// After it: its state may be the one to keep.
+    #[cold]
+    #[inline(never)]
+    fn after(&mut self, now: u32, logic: &Logic<R::Si>, image: &Image) {
+        if let Some(Change::Take { cycle, rest }) = &mut self.change
+            && *cycle == now
+        {
+            *rest = Some((logic.clone(), *image));
+        }
+    }
+
+    /// Moves a change of hands on after a drive cycle, or begins one.
+    #[inline(never)]
+    fn go_on(&mut self, exchange: &Exchange<R>, now: u32, attendant: &mut impl Attendant) {
+        match &mut self.change {
+            Some(Change::Take { cycle, rest }) if is_after(now, *cycle) => {
+                let first = cycle.wrapping_add(1);
+                let plant = exchange.plant_hatch.taken(plant_after(*cycle));
+                let drive = exchange.drive_hatch.taken(first);
+                let odd = is_odd(*cycle);
+                self.change = match (plant, drive, rest.take()) {
+                    (Some((plant, actuators)), Some((drive, command)), Some((logic, image))) => {
+                        self.kept = Some(State {
+                            plant,
+                            drive,
+                            logic,
+                            actuators,
+                            command,
+                            image,
+                            odd,
+                        });
+                        None
+                    }
+                    // Somebody was late, and the parts are not of one moment: once more.
+                    _ => Some(exchange.take(now)),
+                };
+            }
+            Some(_) => {}
+            None => {
+                self.change = match attendant.order() {
+                    None => None,
+                    Some(Order::Keep) => Some(exchange.take(now)),
+                    Some(Order::Restore) => self.kept.clone().map(|state| exchange.put(now, state)),
+                    Some(Order::Rebuild(machine)) => State::fresh(&machine)
+                        .ok()
+                        .map(|state| exchange.put(now, state)),
+                };
+            }
+        }
+    }
+}
+
+impl<R: Scalar> Exchange<R> {
     fn take(&self, now: u32) -> Change<R> {
         let cycle = now.wrapping_add(AHEAD);
         let at = plant_after(cycle);

@@ -92,7 +92,7 @@ fn peer(peer: Peer) -> impl fmt::Display {
 impl<M: RawMutex> Page<'_, M> {
     async fn info<W: Write>(&self, out: &mut Out<W>, logged_in: bool) -> Result<(), W::Error> {
         let now = Instant::now();
-        let (controller, age, cycle, preset, revision, password_set) =
+        let (controller, age, cycle, preset, revision, password_set, settings) =
             self.hmi.visit(|_, control, papers| {
                 (
                     control.controller(now),
@@ -101,12 +101,13 @@ impl<M: RawMutex> Page<'_, M> {
                     papers.setup.preset,
                     papers.setup.revision,
                     papers.auth.secret().is_some(),
+                    papers.keeper.state().name(),
                 )
             });
         let board = self.hmi.desk.board;
         out.put(format_args!(
             "{{\"product\":\"paper winder simulator\",\"simulated\":true,\"version\":{},\"board\":{},\
-             \"machine\":{},\"revision\":{revision},\"cycle\":{cycle},\"uptime_s\":{},",
+             \"machine\":{},\"revision\":{revision},\"settings\":\"{settings}\",\"cycle\":{cycle},\"uptime_s\":{},",
             Text(board.version),
             Text(board.name),
             Text(preset),

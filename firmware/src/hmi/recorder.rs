@@ -19,6 +19,42 @@ pub struct Entry {
     pub value: Option<u16>,
 }
 
+/// An entry as it is kept: a third less than as it is looked at.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    after: u32,
+    /// The word; with the highest bit it counts up.
+    word: u16,
+    value: u16,
+}
+
+impl Kept {
+    const COUNTS: u16 = 1 << 15;
+
+    fn of(entry: Entry) -> Self {
+        let counts = if entry.value.is_none() {
+            Self::COUNTS
+        } else {
+            0
+        };
+        Self {
+            after: entry.after,
+            word: entry.word | counts,
+            value: entry.value.unwrap_or_default(),
+        }
+    }
+
+    fn entry(&self) -> Entry {
+        Entry {
+            after: self.after,
+            word: self.word & !Self::COUNTS,
+            value: (self.word & Self::COUNTS == 0).then_some(self.value),
+        }
+    }
+}
+
+const _: () = assert!(image::COMMAND_WORDS < Kept::COUNTS as usize);
+
 /// The word that may count up by itself.
 const BEAT: u16 = image::HEARTBEAT_PLC.word;
 
@@ -58,7 +94,7 @@ pub struct Recorder {
     pub beginning: Beginning,
     /// The command block at the beginning.
     pub first: Commands,
-    entries: Vec<Entry, ENTRIES>,
+    entries: Vec<Kept, ENTRIES>,
     begun: u32,
     known: Commands,
     /// The heartbeat counts up by itself ...
@@ -116,7 +152,7 @@ impl Recorder {
 
     /// Its entry of a number.
     pub fn entry(&self, number: usize) -> Option<Entry> {
-        self.entries.get(number).copied()
+        self.entries.get(number).map(Kept::entry)
     }
 
     /// Where it ends.
@@ -130,7 +166,7 @@ impl Recorder {
             return;
         };
         let after = cycle.wrapping_sub(self.begun);
-        while let Some(entry) = self.entries.get(*next)
+        while let Some(entry) = self.entries.get(*next).map(Kept::entry)
             && entry.after <= after
         {
             if entry.word == BEAT {
@@ -184,7 +220,7 @@ impl Recorder {
                 }
             }
             let entry = Entry { after, word, value };
-            if is_news && self.entries.push(entry).is_err() {
+            if is_news && self.entries.push(Kept::of(entry)).is_err() {
                 self.full = true;
                 // What was commanded in this cycle is not known as a whole.
                 self.entries.retain(|entry| entry.after != after);

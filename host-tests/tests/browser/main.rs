@@ -8,4 +8,5 @@
 mod bench;
 mod chromium;
 mod looks;
+mod settings;
 mod work;

@@ -13,7 +13,7 @@ use firmware::SPANS;
 use firmware::hmi::desk::{AtDesk, Board};
 use firmware::life::Started;
 use firmware::store::{Keeper, Store};
-use firmware::tasks;
+use firmware::tasks::{self, Hands};
 use model_core::drive::Drive;
 use model_core::logic::Logic;
 use model_core::machine::Machine;
@@ -75,14 +75,14 @@ pub async fn background(machine: &'static Machine, exchange: &'static Exchange, 
     static SERVED: StaticCell<LocalServed> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
 
-    let service = SERVED.init(LocalServed::new(machine)).service();
+    let service = SERVED.init_with(|| LocalServed::new(machine)).service();
     let board = Board {
         name: "Cortex-M in QEMU (mps2)",
         version: env!("CARGO_PKG_VERSION"),
         reset: Restart::TEXTS[usize::from(given.started.why.number())],
     };
     let (_, line) = given.keeper.in_use();
-    let desk = &*DESK.init(LocalDesk::keeping(board, given.keeper));
+    let desk = &*DESK.init_with(|| LocalDesk::keeping(board, given.keeper));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(machine, exchange, service, desk).expect("first"));
@@ -104,7 +104,14 @@ async fn logic(
 ) {
     let control = service.control;
     let mut at_desk = AtDesk { control, desk };
-    let mut logic = Logic::new(machine);
-    let image = service.image;
-    tasks::logic::<Traced, _, _>(&mut logic, exchange, image, &mut Log, &mut at_desk).await;
+    let (mut logic, mut hands) = (Logic::new(machine), Hands::default());
+    tasks::logic::<Traced, _, _>(
+        &mut logic,
+        exchange,
+        service.image,
+        &mut Log,
+        &mut at_desk,
+        Some(&mut hands),
+    )
+    .await;
 }

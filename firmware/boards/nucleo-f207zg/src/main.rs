@@ -10,7 +10,7 @@
 //! | 0x10 | `TIM5`, the time driver | wakes the tasks that are due |
 //! | 0x10 | `UART4`, no device's | plant |
 //! | 0x20 | `UART5`, no device's | regulators |
-//! | 0x30 | `ETH` | wakes the network's tasks |
+//! | 0x30 | `ETH`, `RNG` | wakes the network's tasks; `RNG` never comes |
 //! | 0x30 | `CAN1_TX`, no device's | everything else |
 
 #![no_std]
@@ -105,6 +105,7 @@ fn main() -> ! {
         (interrupt::UART4, Priority::P1),
         (interrupt::UART5, Priority::P2),
         (interrupt::ETH, Priority::P3),
+        (interrupt::RNG, Priority::P3),
         (interrupt::CAN1_TX, Priority::P3),
     ] {
         interrupt.set_priority(priority);

@@ -57,11 +57,11 @@ pub async fn background(exchange: &'static Exchange, pins: ethernet::Pins) {
     static RESOURCES: StaticCell<StackResources<{ MODBUS_SOCKETS + OTHER_SOCKETS }>> =
         StaticCell::new();
 
-    let service = SERVED.init(LocalServed::new(&machine())).service();
+    let service = SERVED.init_with(|| LocalServed::new(&machine())).service();
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(exchange, service).expect("first"));
-    let frames = FRAMES.init(PacketQueue::new());
+    let frames = ethernet::frames(FRAMES.uninit());
     let resources = RESOURCES.init(StackResources::new());
     let stack = ethernet::start(spawner, pins, frames, resources, Network::Dhcp);
     start_modbus(spawner, stack, service);
@@ -70,5 +70,6 @@ pub async fn background(exchange: &'static Exchange, pins: ethernet::Pins) {
 #[embassy_executor::task]
 async fn logic(exchange: &'static Exchange, service: LocalService) {
     let mut logic = Logic::new(&machine());
-    tasks::logic::<Cycles, _, _>(&mut logic, exchange, service.image, &mut Log, &mut ()).await;
+    let image = service.image;
+    tasks::logic::<Cycles, _, _>(&mut logic, exchange, image, &mut Log, &mut (), None).await;
 }

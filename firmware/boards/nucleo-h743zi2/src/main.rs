@@ -3,17 +3,7 @@
 //! Does not compute anything: the tasks are the library's. This crate starts the chip and gives the tasks their
 //! priorities, their clock, their network, their wires.
 //!
-//! # Who may preempt whom
-//!
-//! | Priority | Interrupt | Does |
-//! |---|---|---|
-//! | 0x10 | `TIM3`, the time driver | wakes the tasks that are due; would only interrupt the plant for tasks that wait for it anyway |
-//! | 0x10 | `UART7`, no device's | the plant, then the wires |
-//! | 0x20 | `UART8`, no device's | the regulators |
-//! | 0x30 | `ETH`, `USART2` | wake the link's tasks |
-//! | 0x30 | `SAI1`, no device's | everything else |
-//!
-//! What they share is a mailbox, which keeps no interrupt off.
+//! Who may preempt whom, and what they share, is a table of `docs/board.md`.
 
 #![no_std]
 #![no_main]
@@ -98,6 +88,7 @@ fn main() -> ! {
         (interrupt::UART8, Priority::P2),
         (interrupt::ETH, Priority::P3),
         (interrupt::USART2, Priority::P3),
+        (interrupt::RNG, Priority::P3),
         (interrupt::FLASH, Priority::P3),
         (interrupt::SAI1, Priority::P3),
     ] {
@@ -193,14 +184,14 @@ struct Given {
 async fn all_else(machine: &'static Machine, exchange: &'static Exchange, given: Given) {
     static SERVED: StaticCell<LocalServed> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
-    let service = SERVED.init(LocalServed::new(machine)).service();
+    let service = SERVED.init_with(|| LocalServed::new(machine)).service();
     let board = Board {
         name: "NUCLEO-H743ZI2",
         version: env!("CARGO_PKG_VERSION"),
         reset: given.why,
     };
     let (network, serial) = given.keeper.in_use();
-    let desk = &*DESK.init(LocalDesk::keeping(board, given.keeper));
+    let desk = &*DESK.init_with(|| LocalDesk::keeping(board, given.keeper));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(simulator::logic(machine, exchange, service, desk).expect("first"));

@@ -7,6 +7,7 @@ use core::mem::MaybeUninit;
 use core::ops::Range;
 
 use board_cortex_m::memory::keep_uncached;
+use board_stm32::ethernet;
 use cortex_m::Peripherals;
 use embassy_stm32::eth::PacketQueue;
 use embassy_stm32::flash::FLASH_BASE;
@@ -40,8 +41,5 @@ pub fn prepare(core: &mut Peripherals) {
 /// The Ethernet's frames; called once, after [`prepare`].
 pub fn queue() -> &'static mut Queue {
     // SAFETY: only this function names it, and `static_cell` makes sure that it is called once.
-    let queue = unsafe { &mut *core::ptr::addr_of_mut!(QUEUE) };
-    PacketQueue::init(queue);
-    // SAFETY: the line above has initialized all of it.
-    unsafe { queue.assume_init_mut() }
+    ethernet::frames(unsafe { &mut *core::ptr::addr_of_mut!(QUEUE) })
 }

@@ -9,6 +9,7 @@ use embassy_executor::SendSpawner;
 use embassy_time::Instant;
 use firmware::hmi::desk::AtDesk;
 use firmware::life::Started;
+use firmware::tasks::Hands;
 use firmware::{SPANS, Scalar, tasks};
 use model_core::drive::Drive;
 use model_core::logic::Logic;
@@ -70,6 +71,14 @@ pub async fn logic(
 ) {
     let control = service.control;
     let mut at_desk = AtDesk { control, desk };
-    let (mut logic, image) = (Logic::new(machine), service.image);
-    tasks::logic::<Cycles, _, _>(&mut logic, exchange, image, &mut Log, &mut at_desk).await;
+    let (mut logic, mut hands) = (Logic::new(machine), Hands::default());
+    tasks::logic::<Cycles, _, _>(
+        &mut logic,
+        exchange,
+        service.image,
+        &mut Log,
+        &mut at_desk,
+        Some(&mut hands),
+    )
+    .await;
 }

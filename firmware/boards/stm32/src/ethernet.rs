@@ -2,6 +2,11 @@
 //!
 //! Does not know what is said on a connection. An unplugged cable stops nothing: the address comes when the cable does.
 
+// What is initialized where it is.
+#![allow(unsafe_code)]
+
+use core::mem::MaybeUninit;
+
 use embassy_executor::Spawner;
 use embassy_net::{Config, Runner, Stack, StackResources};
 use embassy_stm32::eth::{self, Ethernet, GenericPhy, PacketQueue, Sma};
@@ -65,6 +70,15 @@ macro_rules! ethernet_pins {
     };
 }
 
+/// Frames that wait, where they are: they are too many for a stack.
+pub fn frames<const TX: usize, const RX: usize>(
+    place: &'static mut MaybeUninit<PacketQueue<TX, RX>>,
+) -> &'static mut PacketQueue<TX, RX> {
+    PacketQueue::init(place);
+    // SAFETY: the line above has initialized all of it.
+    unsafe { place.assume_init_mut() }
+}
+
 /// Starts the network, with frames where the Ethernet's DMA reaches them. Runs in the background, where everything of
 /// the network stays.
 pub fn start<const TX: usize, const RX: usize, const SOCKETS: usize>(
@@ -110,7 +124,9 @@ async fn run(runner: Runner<'static, Device>) -> ! {
 #[embassy_executor::task]
 async fn fall_back(stack: Stack<'static>) -> ! {
     net::fall_back(stack, |address| {
-        defmt::info!("address {}", defmt::Display2Format(&address));
+        // As bytes: interrupts are off for as long as a line of the log is written.
+        let (bytes, prefix) = (address.address().octets(), address.prefix_len());
+        defmt::info!("address {=[u8; 4]}/{=u8}", bytes, prefix);
     })
     .await
 }

@@ -187,6 +187,12 @@ function Alarm() {
     }
     ${warnings.map((w) => html`<p class="alarm warn" key=${w.name}><${Icon} name="faults" /><span>
       <b>Warning</b> ${w.description}</span></p>`)}
+    ${
+      info.value?.settings === 'undecided'
+        ? html`<p class="alarm warn"><${Icon} name="faults" /><span><b>Settings</b> What stands in the flash is of no use:
+          the defaults are in use, and nothing is stored until somebody decides, under Parameters, Board.</span></p>`
+        : null
+    }
     ${refusal && !fault ? html`<p class="alarm info"><span><b>Refused</b> ${code('refusal')}</span></p>` : null}
   </div>`;
 }

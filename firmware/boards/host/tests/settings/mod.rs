@@ -129,6 +129,7 @@ fn what_is_foreign_stays_until_somebody_decides() {
     assert_eq!(settings["state"], "undecided");
     assert!(settings["why"].as_str().unwrap().contains("damaged"));
     assert!(browser.get("events").to_string().contains("defaults: "));
+    assert_eq!(browser.get("info")["settings"], "undecided");
     apply(&mut browser, 6000);
     assert_eq!(put(&mut browser, json!({"serial": {"address": 9}})).0, 200);
     let settings = browser.get("settings");

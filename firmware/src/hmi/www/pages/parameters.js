@@ -7,7 +7,8 @@
  */
 import { html, useState, useEffect, useRef } from '../vendor/ui.js';
 import { get, write, attempt, note, save, detail, info } from '../api.js';
-import { Icon, Dialog, Switch, sentence } from '../parts.js';
+import { Icon, Dialog, Switch, useGet, sentence } from '../parts.js';
+import Board, { Kept } from './board.js';
 
 /** The parts as people call them. */
 const PARTS = {
@@ -165,6 +166,7 @@ export default function Parameters() {
   const [errors, setErrors] = useState({});
   const [open, setOpen] = useState(null);
   const upload = useRef();
+  const [settings, , again] = useGet('settings', 2000);
   const revision = info.value?.revision;
 
   const load = async () => {
@@ -261,6 +263,7 @@ export default function Parameters() {
 
   return html`<div class="head"><h1>Parameters</h1>
       <span class="quiet"><b>${answer.machine}</b>, revision ${answer.revision}</span>
+      <${Kept} settings=${settings} />
       <span class="row"><button type="button" onClick=${() => setOpen('presets')}
         disabled=${answer.locked}>Presets</button>
         <button type="button" onClick=${() => upload.current.click()} disabled=${answer.locked}>Import</button>
@@ -285,9 +288,12 @@ export default function Parameters() {
         })}
           <li><button type="button" class="plain" aria-pressed=${!search && at === 'changed' ? 'true' : 'false'}
             onClick=${() => (choose('changed'), find(''))}>Differs from the default<em>${different}</em></button></li>
+          <li><button type="button" class="plain" aria-pressed=${!search && at === 'board' ? 'true' : 'false'}
+            onClick=${() => (choose('board'), find(''))}>Board</button></li>
               </ul>
       </nav>
       <div class="stack">
+        ${at === 'board' && !search ? html`<${Board} settings=${settings} again=${again} />` : null}
         ${shown.map(
           (
             part,
@@ -295,7 +301,7 @@ export default function Parameters() {
           <ul>${part.parameters.map((p) => html`<${Row} key=${p.name} p=${p} error=${errors[p.name]}
             locked=${answer.locked} onstage=${stage} />`)}</ul></section>`,
         )}
-        ${shown.length ? null : html`<p class="card wait">
+        ${shown.length || (at === 'board' && !search) ? null : html`<p class="card wait">
           ${search ? `No parameter is called “${search}”.` : 'All are at their defaults.'}</p>`}
       </div>
     </div>
