@@ -17,12 +17,14 @@ use model_core::logic::{Mode, command, status};
 use model_core::machine::Machine;
 
 use super::Hmi;
+use super::acceptance::Acceptance;
 use super::answer::{Detail, Refusal};
 use super::auth::Auth;
 use super::events::Events;
 use super::panel::{self, Panel};
 use super::recorder::{Beginning, Recorder, Replayed};
 use super::setup::Setup;
+use super::timed::Timed;
 use crate::attendant::{Attendant, Done, Order};
 use crate::link::ControlCell;
 use crate::link::control::{Control, Controller};
@@ -62,6 +64,8 @@ pub(super) struct Papers {
     pub events: Events,
     pub recorder: Recorder,
     pub panel: Panel,
+    pub timed: Timed,
+    pub acceptance: Acceptance,
     pub snapshot: Option<Snapshot>,
     pub forget_times: bool,
     /// The panel gives the winder back once the drives are off.
@@ -76,6 +80,7 @@ pub(super) struct Snapshot {
     pub cycle: u32,
     machine: Machine,
     panel: Panel,
+    timed: Timed,
 }
 
 /// What is to be done once an order is.
@@ -112,6 +117,8 @@ impl<M: RawMutex> Desk<M> {
                 events,
                 recorder: Recorder::new(Commands::of(machine)),
                 panel: Panel::new(machine),
+                timed: Timed::default(),
+                acceptance: Acceptance::default(),
                 keeper,
                 snapshot: None,
                 forget_times: false,
@@ -136,6 +143,15 @@ impl Papers {
     /// Somebody did something to the simulator.
     pub fn audit(&mut self, text: fmt::Arguments) {
         self.events.add(self.cycle, "audit", text);
+    }
+
+    fn end_faults(&mut self, cycle: u32, commands: &mut Commands) {
+        let Self { timed, events, .. } = self;
+        timed.before(cycle, commands, |fault| {
+            let (word, bit) = fault.name();
+            let (dot, bit) = bit.map_or(("", ""), |bit| (".", bit));
+            events.add(cycle, "audit", format_args!("{word}{dot}{bit} is over"));
+        });
     }
 
     fn order(&mut self, order: Order, then: Then) -> Result<(), Refusal> {
@@ -167,6 +183,10 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                 papers.recorder.before(cycle, &mut image.commands);
             } else if by_panel {
                 papers.panel.cycle(&image.feedback, &mut image.commands);
+            }
+            // A replay has every end of a fault among its commands.
+            if !papers.recorder.is_playing() {
+                papers.end_faults(cycle, &mut image.commands);
             }
             if papers.forget_times {
                 set_bits(image, command::RESET_TIMES, true);
@@ -222,6 +242,7 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                         cycle,
                         machine: papers.setup.in_use.clone(),
                         panel: papers.panel.clone(),
+                        timed: papers.timed.clone(),
                     });
                     papers.recorder.begin(cycle, Beginning::Snapshot, commands);
                 }
@@ -235,8 +256,13 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                         self.desk.settle.signal(());
                     }
                     papers.panel = snapshot.panel.clone();
+                    papers.timed = snapshot.timed.clone();
+                    papers.timed.shift(cycle.wrapping_sub(snapshot.cycle));
                     match then {
-                        Then::Replay => papers.recorder.play(cycle),
+                        Then::Replay => {
+                            papers.timed = Timed::default();
+                            papers.recorder.play(cycle);
+                        }
                         _ => papers.recorder.begin(cycle, Beginning::Snapshot, commands),
                     }
                 }
@@ -296,11 +322,11 @@ impl<M: RawMutex> Hmi<'_, M> {
         })
     }
 
-    /// Commands several things at once: all of them or none.
+    /// Commands several things at once: all of them or none; faults for a time, if there is one.
     ///
     /// # Errors
-    /// Some are the winder's, and the panel does not control it.
-    pub(super) fn command(&self, settings: &[Setting]) -> Result<(), Refusal> {
+    /// Some are the winder's, and the panel does not control it; the time cannot be.
+    pub(super) fn command(&self, settings: &[Setting], for_s: Option<f64>) -> Result<(), Refusal> {
         let now = Instant::now();
         self.visit(|image, control, papers| {
             let words = |s: &Setting| usize::from(s.signal.word)..usize::from(s.signal.word) + 1;
@@ -315,7 +341,14 @@ impl<M: RawMutex> Hmi<'_, M> {
                     return Err(refusal);
                 }
             }
+            let cycles = match for_s {
+                Some(for_s) => Some(papers.timed.cycles(for_s, settings)?),
+                None => None,
+            };
+            let out = cycles.map(|cycles| papers.cycle.wrapping_add(1).wrapping_add(cycles));
+            let sound = Commands::of(&papers.setup.in_use);
             for setting in settings {
+                papers.timed.put(*setting, &sound, out);
                 let Setting { signal, mask, word } = *setting;
                 let old = image.commands.word(signal);
                 image.commands.set_word(signal, old & !mask | word & mask);

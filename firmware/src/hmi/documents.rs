@@ -19,7 +19,7 @@ use super::Hmi;
 use super::answer::{Document, List, OrNull, Out, Text};
 use super::desk::locked;
 use super::recorder::Beginning;
-use super::{settings, setup};
+use super::{acceptance, settings, setup};
 use crate::link::control::{Client, Controller, POLL_EDGES_MS, Peer, Writer};
 
 /// The name in lists.
@@ -36,6 +36,7 @@ pub enum What {
     Info { logged_in: bool },
     Signals,
     Image,
+    Faults,
     Panel,
     Parameters,
     Presets,
@@ -46,6 +47,7 @@ pub enum What {
     Snapshot,
     Journal,
     Health,
+    Acceptance,
 }
 
 /// A document, and what it is about.
@@ -67,6 +69,7 @@ impl<M: RawMutex> Document for Page<'_, M> {
             What::Info { logged_in } => self.info(out, logged_in).await,
             What::Signals => signals(out).await,
             What::Image => self.image(out).await,
+            What::Faults => self.faults(out).await,
             What::Panel => self.panel(out).await,
             What::Parameters => self.parameters(out).await,
             What::Presets => presets(out).await,
@@ -77,6 +80,7 @@ impl<M: RawMutex> Document for Page<'_, M> {
             What::Snapshot => self.snapshot(out).await,
             What::Journal => self.journal(out).await,
             What::Health => self.health(out).await,
+            What::Acceptance => acceptance::write(self.hmi, out).await,
         }
     }
 }
@@ -135,6 +139,27 @@ impl<M: RawMutex> Page<'_, M> {
         out.put(format_args!("{},", List(commands.iter()))).await?;
         out.put(format_args!("\"feedback\":{}}}", List(feedback.iter())))
             .await
+    }
+
+    async fn faults<W: Write>(&self, out: &mut Out<W>) -> Result<(), W::Error> {
+        let (cycle, timed) = self
+            .hmi
+            .desk
+            .with(|papers| (papers.cycle, papers.timed.clone()));
+        let timed = timed.iter().map(|fault| {
+            fmt::from_fn(move |f| {
+                let (word, bit) = fault.name();
+                let (dot, bit) = bit.map_or(("", ""), |bit| (".", bit));
+                let left = seconds(fault.left(cycle));
+                write!(f, "{{\"name\":\"{word}{dot}{bit}\",\"left_s\":{left}}}")
+            })
+        });
+        out.put(format_args!("{{\"timed\":[")).await?;
+        for (i, fault) in timed.enumerate() {
+            let comma = if i == 0 { "" } else { "," };
+            out.put(format_args!("{comma}{fault}")).await?;
+        }
+        out.put(format_args!("]}}")).await
     }
 
     async fn panel<W: Write>(&self, out: &mut Out<W>) -> Result<(), W::Error> {

@@ -15,11 +15,14 @@
 //! | `setup` | the machine's parameters, staged and applied as one |
 //! | `settings` | what the board remembers, and whether it does |
 //! | [`panel`] | the operator panel's sequence |
+//! | `timed` | faults that end by themselves |
+//! | `acceptance` | the acceptance run that the page asks for |
 //! | `events`, `recorder` | what has happened, and every command with its cycle |
 
 // A refusal with its details has no heap to be put on.
 #![allow(clippy::result_large_err, clippy::large_enum_variant)]
 
+mod acceptance;
 mod answer;
 pub mod assets;
 mod auth;
@@ -34,6 +37,7 @@ mod recorder;
 pub mod routes;
 mod settings;
 mod setup;
+mod timed;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use picoserve::io::Socket;
