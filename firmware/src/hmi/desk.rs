@@ -6,6 +6,7 @@
 
 use core::cell::RefCell;
 use core::fmt;
+use core::sync::atomic::{AtomicU16, Ordering};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::RawMutex;
@@ -21,6 +22,7 @@ use super::acceptance::Acceptance;
 use super::answer::{Detail, Refusal};
 use super::auth::Auth;
 use super::events::Events;
+use super::gains::Known;
 use super::panel::{self, Panel};
 use super::recorder::{Beginning, Recorder, Replayed};
 use super::setup::Setup;
@@ -42,6 +44,21 @@ pub struct Board {
     pub version: &'static str,
     /// Why it has started.
     pub reset: &'static str,
+    /// Connections of browsers that there is room for.
+    pub connections: u16,
+    /// What it knows of its memory.
+    pub memory: fn() -> Option<Memory>,
+}
+
+/// Memory of a board, in bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Memory {
+    /// Variables.
+    pub statics: u32,
+    /// Kept for the stack.
+    pub stack: u32,
+    /// Of it, what has ever been used, as far as it can be seen.
+    pub stack_used: u32,
 }
 
 /// The desk.
@@ -51,7 +68,17 @@ pub struct Desk<M: RawMutex> {
     cycles: Watch<M, u32, STREAMS>,
     /// The settings shall be brought to the flash.
     pub(super) settle: Wake<M, ()>,
+    connected: AtomicU16,
     papers: Mutex<M, RefCell<Papers>>,
+}
+
+/// A connection of a browser, while there is one.
+pub(super) struct Connected<'a>(&'a AtomicU16);
+
+impl Drop for Connected<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 /// What lies on it.
@@ -65,6 +92,7 @@ pub(super) struct Papers {
     pub recorder: Recorder,
     pub panel: Panel,
     pub timed: Timed,
+    pub gains: Known,
     pub acceptance: Acceptance,
     pub snapshot: Option<Snapshot>,
     pub forget_times: bool,
@@ -81,6 +109,7 @@ pub(super) struct Snapshot {
     machine: Machine,
     panel: Panel,
     timed: Timed,
+    gains: Known,
 }
 
 /// What is to be done once an order is.
@@ -110,6 +139,7 @@ impl<M: RawMutex> Desk<M> {
             board,
             cycles: Watch::new(),
             settle: Wake::new(),
+            connected: AtomicU16::new(0),
             papers: Mutex::new(RefCell::new(Papers {
                 cycle: 0,
                 auth: Auth::new(),
@@ -118,6 +148,7 @@ impl<M: RawMutex> Desk<M> {
                 recorder: Recorder::new(Commands::of(machine)),
                 panel: Panel::new(machine),
                 timed: Timed::default(),
+                gains: Known::new(machine),
                 acceptance: Acceptance::default(),
                 keeper,
                 snapshot: None,
@@ -132,6 +163,17 @@ impl<M: RawMutex> Desk<M> {
     /// Tells of every drive cycle; none when as many as there can be are told already.
     pub fn cycles(&self) -> Option<Receiver<'_, M, u32, STREAMS>> {
         self.cycles.receiver()
+    }
+
+    /// One more connection, until it is dropped.
+    pub(super) fn connect(&self) -> Connected<'_> {
+        self.connected.fetch_add(1, Ordering::Relaxed);
+        Connected(&self.connected)
+    }
+
+    /// How many connections there are.
+    pub(super) fn connected(&self) -> u16 {
+        self.connected.load(Ordering::Relaxed)
     }
 
     pub(super) fn with<R>(&self, f: impl FnOnce(&mut Papers) -> R) -> R {
@@ -211,6 +253,7 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                 set_bits(image, command::RESET_TIMES, false);
             }
             papers.events.look(cycle, image);
+            papers.gains.look(image);
             let replayed = papers
                 .recorder
                 .after(cycle, image)
@@ -243,6 +286,7 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                         machine: papers.setup.in_use.clone(),
                         panel: papers.panel.clone(),
                         timed: papers.timed.clone(),
+                        gains: papers.gains.clone(),
                     });
                     papers.recorder.begin(cycle, Beginning::Snapshot, commands);
                 }
@@ -256,6 +300,7 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                         self.desk.settle.signal(());
                     }
                     papers.panel = snapshot.panel.clone();
+                    papers.gains = snapshot.gains.clone();
                     papers.timed = snapshot.timed.clone();
                     papers.timed.shift(cycle.wrapping_sub(snapshot.cycle));
                     match then {
@@ -268,6 +313,7 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                 }
                 Some(Then::Rebuild) => {
                     papers.panel = Panel::new(&papers.setup.in_use);
+                    papers.gains = Known::new(&papers.setup.in_use);
                     papers.recorder.begin(cycle, Beginning::PowerUp, commands);
                 }
                 None => {}

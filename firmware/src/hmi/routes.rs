@@ -123,7 +123,7 @@ pub static ROUTES: &[Route] = routes! {
     Put    "settings"          session Action::Connect, "network and serial line for the next start";
     Post   "settings/overwrite" session Action::Overwrite, "what is in use takes the place of what is of no use in the flash";
     Delete "settings"          session Action::ResetSettings, "empties the flash: the next start has the defaults";
-    Get    "gains"             anybody Action::Show(What::Gains), "the gains of the loop that auto-tune has looked at";
+    Get    "gains"             anybody Action::Show(What::Gains), "the gains of all loops at the present diameters, and whether auto-tune has set them";
     Get    "link"              anybody Action::Show(What::Link), "the links' clients, and who wrote which command last";
     Get    "events"            anybody Action::Events, "what has happened, after the event of the number `after`";
     Get    "snapshot"          anybody Action::Show(What::Snapshot), "whether there is a snapshot, and of what the recording is";
@@ -131,7 +131,7 @@ pub static ROUTES: &[Route] = routes! {
     Post   "restore"           session Action::Restore { replay: false }, "goes on from the snapshot";
     Post   "replay"            session Action::Restore { replay: true }, "goes on from the snapshot with what was commanded since";
     Get    "journal"           anybody Action::Show(What::Journal), "the recording as CSV; from power-up, the command line tool can replay it";
-    Get    "health"            anybody Action::Show(What::Health), "the times of the tasks, why the board has started";
+    Get    "health"            anybody Action::Show(What::Health), "the times of the tasks, memory and places in use, why the board has started";
     Post   "health/reset"      session Action::ForgetTimes, "forgets the worst times and the overruns";
     Get    "acceptance"        anybody Action::Show(What::Acceptance), "the acceptance run that was asked for, and what it has found";
     Post   "acceptance"        session Action::AskAcceptance, "asks for an acceptance run, or takes it back";

@@ -7,5 +7,7 @@
 
 mod bench;
 mod chromium;
+mod files;
+mod load;
 mod looks;
 mod work;

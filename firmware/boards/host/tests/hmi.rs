@@ -591,3 +591,62 @@ fn an_acceptance_run_is_asked_for_reported_and_read() {
         (409, &json!("request"))
     );
 }
+
+/// What auto-tune tells of its loop is what the list of all loops has of it, before and after.
+#[test]
+fn the_gains_of_all_loops_are_those_that_the_drive_reports() {
+    let board = simulator(20.0);
+    let mut browser = Browser::logged_in(&board);
+    let near = |listed: &Value, word: &image::Signal, image: &Value| {
+        let words = &image["feedback"];
+        let at = |i: u16| words[usize::from(word.word + i)].as_u64().unwrap() as f64;
+        let counts = match word.kind {
+            image::Kind::U32 => 65536.0 * at(0) + at(1),
+            _ => at(0),
+        };
+        let (reported, listed) = (counts / f64::from(word.counts), listed.as_f64().unwrap());
+        let resolution = 1.0 / f64::from(word.counts);
+        assert!(
+            (listed - reported).abs() < 1e-3 * reported + resolution,
+            "{}: {listed}, reported {reported}",
+            word.name
+        );
+    };
+    browser.post("panel", json!({"action": "take"}));
+    browser.post("panel", json!({"action": "prepare"}));
+    browser.wait("panel", |panel| panel["state"] == "ready");
+    for number in 0..3 {
+        let before = browser.get("gains")["loops"][number].clone();
+        assert_eq!(before["source"], "machine");
+        browser.post("panel", json!({"action": "autotune", "loop": number}));
+        let tuned = browser.wait("gains", |g| g["loops"][number]["source"] == "auto-tune");
+        let after = &tuned["loops"][number];
+        let image = browser.get("image");
+        near(&before["gain"], &image::AUTOTUNE_GAIN_OLD, &image);
+        near(&after["gain"], &image::AUTOTUNE_GAIN_NEW, &image);
+        near(&after["time_s"], &image::AUTOTUNE_TIME_NEW, &image);
+        browser.wait("panel", |panel| panel["state"] != "tuning");
+        let state = browser.get("panel")["state"].clone();
+        if state != "off" && state != "ready" {
+            browser.post("panel", json!({"action": "stop"}));
+            browser.wait("panel", |panel| panel["message"] == "the machine stands");
+        }
+    }
+}
+
+#[test]
+fn health_tells_what_is_in_use() {
+    let board = simulator(1.0);
+    let mut browser = Browser::new(&board);
+    let health = browser.get("health");
+    // A process on a PC has no memory of its own to tell of.
+    assert_eq!(health["memory"], Value::Null);
+    let places = health["places"].as_array().unwrap();
+    let of = |name| places.iter().find(|place| place["name"] == name).unwrap();
+    assert_eq!(of("browsers")["used"], 1);
+    assert_eq!(of("browsers")["of"], CONNECTIONS);
+    let mut other = Browser::new(&board);
+    other.get("info");
+    let places = browser.get("health")["places"].clone();
+    assert_eq!(places[0]["used"], 2, "{places}");
+}
