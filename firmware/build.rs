@@ -1,4 +1,5 @@
-//! Packs the page: every file of `src/hmi/www` that a browser asks for, compressed, with its type and its tag.
+//! Packs the page: every file of `src/hmi/www` that a browser asks for, compressed, with its type and its tag; and the
+//! lessons, as one more file.
 //!
 //! Not here: a bundler. The files are served one by one, as they are.
 
@@ -13,6 +14,7 @@ use flate2::{Compression, Crc, GzBuilder};
 const TYPES: &[(&str, &str)] = &[
     ("css", "text/css; charset=utf-8"),
     ("html", "text/html; charset=utf-8"),
+    ("json", "application/json"),
     ("js", "text/javascript; charset=utf-8"),
     ("png", "image/png"),
     ("svg", "image/svg+xml"),
@@ -28,18 +30,28 @@ fn main() -> io::Result<()> {
         walk(&www, &mut files)?;
     }
     files.sort();
+    let mut contents = Vec::new();
+    for file in &files {
+        let path = file.strip_prefix(&www).unwrap_or(file);
+        // What has to do with the vendored parts' making is for people.
+        if path.extension().is_none_or(|extension| extension != "json") {
+            contents.push((path.to_owned(), fs::read(file)?));
+        }
+    }
+    let lessons = lessons(&here.join("../host-tests/lessons"))?;
+    contents.push(("lessons.json".into(), lessons));
 
     let mut table = String::from("&[\n");
-    for (number, file) in files.iter().enumerate() {
-        let extension = file.extension().and_then(|e| e.to_str());
+    for (number, (path, content)) in contents.iter().enumerate() {
+        let extension = path.extension().and_then(|e| e.to_str());
         let Some((_, kind)) = TYPES.iter().find(|(e, _)| Some(*e) == extension) else {
             continue;
         };
-        let packed = pack(&fs::read(file)?)?;
+        let packed = pack(content)?;
         let mut crc = Crc::new();
         crc.update(&packed);
         let stored = out.join(format!("{number}.gz"));
-        let path = file.strip_prefix(&www).unwrap_or(file).display();
+        let path = path.display();
         writeln!(
             table,
             "    Asset {{ path: \"/{path}\", content_type: \"{kind}\", etag: \"\\\"{:08x}\\\"\", gzip: \
@@ -51,6 +63,25 @@ fn main() -> io::Result<()> {
     }
     table.push_str("]\n");
     fs::write(out.join("assets.rs"), table)
+}
+
+/// The lessons as a list, each with its name. What solves them stays with us.
+fn lessons(directory: &Path) -> io::Result<Vec<u8>> {
+    println!("cargo::rerun-if-changed={}", directory.display());
+    let mut files = Vec::new();
+    walk(directory, &mut files)?;
+    files.sort();
+    let mut list = Vec::new();
+    for file in &files {
+        let text = fs::read_to_string(file)?;
+        let mut lesson: serde_json::Map<String, serde_json::Value> =
+            toml::from_str(&text).map_err(io::Error::other)?;
+        lesson.remove("solution");
+        let name = file.file_stem().unwrap_or_default().to_string_lossy();
+        lesson.insert("name".into(), name.into());
+        list.push(lesson);
+    }
+    serde_json::to_vec(&list).map_err(io::Error::other)
 }
 
 fn directory(variable: &str) -> PathBuf {

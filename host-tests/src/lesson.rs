@@ -35,7 +35,7 @@ use model_core::image::{self, Commands, Image, Section};
 use model_core::machine::Machine;
 use serde::Deserialize;
 
-use crate::accept::controller::{REFERENCE, StPlc};
+use crate::accept::controller::{Controller, REFERENCE, StPlc};
 use crate::accept::world::{LOOK, Lockstep, World};
 use crate::scenario::place::{Condition, Place};
 use crate::scenario::{CYCLES_PER_S, seconds};
@@ -315,9 +315,9 @@ pub fn shipped() -> Result<Vec<Lesson>> {
 }
 
 /// A lesson that is being played.
-pub struct Play<'a> {
+pub struct Play<'a, C = StPlc> {
     lesson: &'a Lesson,
-    world: Lockstep<StPlc>,
+    world: Lockstep<C>,
     own: Commands,
     /// When each event's condition came true.
     since: Vec<Option<u64>>,
@@ -328,14 +328,21 @@ pub struct Play<'a> {
 }
 
 impl<'a> Play<'a> {
-    /// At power-up.
+    /// At power-up, at the desk of the reference PLC.
     pub fn new(lesson: &'a Lesson) -> Result<Self> {
+        Self::at_desk_of(StPlc::new(REFERENCE)?, lesson)
+    }
+}
+
+impl<'a, C: Controller> Play<'a, C> {
+    /// At power-up, at the desk of another PLC.
+    pub fn at_desk_of(plc: C, lesson: &'a Lesson) -> Result<Self> {
         let machine = Machine::news_8000();
         let mut own = Commands::of(&machine);
         for s in &lesson.set {
             s.place.set(&mut own, s.counts);
         }
-        let world = Lockstep::new(&machine, StPlc::new(REFERENCE)?);
+        let world = Lockstep::new(&machine, plc);
         Ok(Self {
             lesson,
             world: world.context("the machine cannot be simulated")?,

@@ -1,6 +1,7 @@
 //! The acceptance run: the reference program passes, every seeded error is found, and whatever a PLC does, it ends.
 #![allow(clippy::unwrap_used)]
 
+use firmware::hmi::panel::Panel;
 use host_tests::accept::checks::{Miss, markdown};
 use host_tests::accept::controller::{
     Controller, DemoPlc, Garbage, REFERENCE, Silent, StPlc, Stopping,
@@ -11,6 +12,7 @@ use host_tests::accept::world::{LIMIT_S, Lockstep};
 use host_tests::accept::{Outcome, accept};
 use host_tests::lesson::{Play, shipped};
 use host_tests::plc::{Plc, Recipe};
+use model_core::image::{Commands, Image};
 use model_core::machine::Machine;
 
 fn run(plc: impl Controller) -> Outcome {
@@ -164,6 +166,36 @@ fn lessons_are_solved_by_their_solutions_and_not_by_waiting() {
             lesson.name,
             idle.points()
         );
+    }
+}
+
+/// The simulator's own panel at the desk.
+struct AtDesk(Panel);
+
+impl Controller for AtDesk {
+    fn period(&self) -> u64 {
+        1
+    }
+
+    fn cycle(&mut self, image: &Image, commands: &mut Commands) {
+        self.0.cycle(&image.feedback, commands);
+    }
+}
+
+/// On the page, where no PLC need be, the operator panel follows the same desk.
+#[test]
+fn lessons_are_solved_at_the_panel_as_at_a_plc() {
+    for lesson in shipped().unwrap() {
+        let panel = AtDesk(Panel::new(&Machine::news_8000()));
+        let mut play = Play::at_desk_of(panel, &lesson).unwrap();
+        for act in &lesson.solution {
+            play.act(act).unwrap();
+        }
+        let told: Vec<_> = play
+            .scores()
+            .map(|(s, earned)| (s.what.clone(), earned))
+            .collect();
+        assert_eq!(play.points(), 100, "{}: {told:?}", lesson.name);
     }
 }
 

@@ -49,6 +49,13 @@ pub fn read<'a, T: Deserialize<'a>>(body: &'a [u8]) -> Result<T, Refusal> {
     Ok(value)
 }
 
+/// Reads one whose texts may have escaped characters.
+pub fn read_escaped<'a, T: Deserialize<'a>>(body: &'a [u8]) -> Result<T, Refusal> {
+    let mut text = [0; 256];
+    let (value, _) = serde_json_core::from_slice_escaped(body, &mut text).map_err(|_| unread())?;
+    Ok(value)
+}
+
 /// The machine that the client has seen.
 #[derive(Deserialize)]
 pub struct Seen {
@@ -71,10 +78,7 @@ pub struct Password {
 impl Password {
     /// Its characters may be escaped.
     pub fn read(body: &[u8]) -> Result<Self, Refusal> {
-        let mut text = [0; 256];
-        let (password, _): (Self, _) =
-            serde_json_core::from_slice_escaped(body, &mut text).map_err(|_| unread())?;
-        Ok(password)
+        read_escaped(body)
     }
 }
 
@@ -148,17 +152,28 @@ impl<'de> Visitor<'de> for Staged<'_> {
 /// Commands at once.
 const COMMANDS: usize = 64;
 
-/// Commands by name, a bit by its word's name, a point and its own, in counts.
-pub fn commands(body: &[u8]) -> Result<Vec<Setting, COMMANDS>, Refusal> {
+/// What is to be commanded.
+#[derive(Debug, Default)]
+pub struct Wanted {
+    pub settings: Vec<Setting, COMMANDS>,
+    /// For this time, s; for good where there is none.
+    pub for_s: Option<f64>,
+}
+
+/// The time's name.
+const FOR: &str = "for_s";
+
+/// Commands by name, a bit by its word's name, a point and its own, in counts; and how long they stand.
+pub fn commands(body: &[u8]) -> Result<Wanted, Refusal> {
     let mut wrong = None;
-    let mut settings = Vec::new();
+    let mut wanted = Wanted::default();
     let mut json = Json::new(body, None);
     let read = Commands {
-        settings: &mut settings,
+        wanted: &mut wanted,
         wrong: &mut wrong,
     };
     match (read.deserialize(&mut json), json.end(), wrong) {
-        (Ok(()), Ok(_), None) => Ok(settings),
+        (Ok(()), Ok(_), None) => Ok(wanted),
         (_, _, Some(detail)) => {
             let mut refusal = Refusal::new(422, format_args!("a command cannot be"));
             refusal.error = cut("a command cannot be");
@@ -170,7 +185,7 @@ pub fn commands(body: &[u8]) -> Result<Vec<Setting, COMMANDS>, Refusal> {
 }
 
 struct Commands<'a> {
-    settings: &'a mut Vec<Setting, COMMANDS>,
+    wanted: &'a mut Wanted,
     wrong: &'a mut Option<Detail>,
 }
 
@@ -193,8 +208,12 @@ impl<'de> Visitor<'de> for Commands<'_> {
             // Until the value has been read, it is the one that is wrong.
             let before = self
                 .wrong
-                .replace(Detail::new(name, "", "not a whole number"));
+                .replace(Detail::new(name, "", not_a_number(name)));
             let number: f64 = map.next_value()?;
+            if name == FOR {
+                (self.wanted.for_s, *self.wrong) = (Some(number), before);
+                continue;
+            }
             let counts = number as i32;
             if number - f64::from(counts) != 0.0 {
                 continue;
@@ -202,7 +221,7 @@ impl<'de> Visitor<'de> for Commands<'_> {
             *self.wrong = before;
             match setting(name, counts) {
                 Ok(setting) => {
-                    if self.settings.push(setting).is_err() {
+                    if self.wanted.settings.push(setting).is_err() {
                         self.wrong.get_or_insert(Detail::new(
                             name,
                             counts,
@@ -216,6 +235,14 @@ impl<'de> Visitor<'de> for Commands<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// Why what stands for a value is none.
+fn not_a_number(name: &str) -> &'static str {
+    match name {
+        FOR => "not a number",
+        _ => "not a whole number",
     }
 }
 
@@ -263,8 +290,10 @@ mod tests {
     #[test]
     fn commands_are_counts_and_bits() {
         let body = br#"{"v_set":12000,"winder_command.run":1,"fault_preset":-33}"#;
-        let settings = commands(body).expect("right");
-        let plain: std::vec::Vec<_> = settings
+        let wanted = commands(body).expect("right");
+        assert_eq!(wanted.for_s, None);
+        let plain: std::vec::Vec<_> = wanted
+            .settings
             .iter()
             .map(|s| (s.signal.name, s.mask, s.word as i16))
             .collect();
@@ -296,6 +325,7 @@ mod tests {
             ),
             (r#"{"v_set":"fast"}"#, "v_set", "not a whole number"),
             (r#"{"v_set":1.5}"#, "v_set", "not a whole number"),
+            (r#"{"for_s":"long"}"#, "for_s", "not a number"),
         ] {
             let refusal = commands(body.as_bytes()).expect_err(body);
             assert_eq!(refusal.status, 422);
@@ -307,6 +337,8 @@ mod tests {
             );
         }
         assert!(commands(b"").is_err() && commands(b"{} x").is_err());
+        let timed = commands(br#"{"for_s":2.5,"fault_web_break":1}"#).expect("right");
+        assert_eq!((timed.for_s, timed.settings.len()), (Some(2.5), 1));
     }
 
     #[test]

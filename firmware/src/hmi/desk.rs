@@ -6,6 +6,7 @@
 
 use core::cell::RefCell;
 use core::fmt;
+use core::sync::atomic::{AtomicU16, Ordering};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::RawMutex;
@@ -17,12 +18,15 @@ use model_core::logic::{Mode, command, status};
 use model_core::machine::Machine;
 
 use super::Hmi;
+use super::acceptance::Acceptance;
 use super::answer::{Detail, Refusal};
 use super::auth::Auth;
 use super::events::Events;
+use super::gains::Known;
 use super::panel::{self, Panel};
 use super::recorder::{Beginning, Recorder, Replayed};
 use super::setup::Setup;
+use super::timed::Timed;
 use crate::attendant::{Attendant, Done, Order};
 use crate::link::ControlCell;
 use crate::link::control::{Control, Controller};
@@ -40,6 +44,21 @@ pub struct Board {
     pub version: &'static str,
     /// Why it has started.
     pub reset: &'static str,
+    /// Connections of browsers that there is room for.
+    pub connections: u16,
+    /// What it knows of its memory.
+    pub memory: fn() -> Option<Memory>,
+}
+
+/// Memory of a board, in bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Memory {
+    /// Variables.
+    pub statics: u32,
+    /// Kept for the stack.
+    pub stack: u32,
+    /// Of it, what has ever been used, as far as it can be seen.
+    pub stack_used: u32,
 }
 
 /// The desk.
@@ -49,7 +68,17 @@ pub struct Desk<M: RawMutex> {
     cycles: Watch<M, u32, STREAMS>,
     /// The settings shall be brought to the flash.
     pub(super) settle: Wake<M, ()>,
+    connected: AtomicU16,
     papers: Mutex<M, RefCell<Papers>>,
+}
+
+/// A connection of a browser, while there is one.
+pub(super) struct Connected<'a>(&'a AtomicU16);
+
+impl Drop for Connected<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 /// What lies on it.
@@ -62,6 +91,9 @@ pub(super) struct Papers {
     pub events: Events,
     pub recorder: Recorder,
     pub panel: Panel,
+    pub timed: Timed,
+    pub gains: Known,
+    pub acceptance: Acceptance,
     pub snapshot: Option<Snapshot>,
     pub forget_times: bool,
     /// The panel gives the winder back once the drives are off.
@@ -76,6 +108,8 @@ pub(super) struct Snapshot {
     pub cycle: u32,
     machine: Machine,
     panel: Panel,
+    timed: Timed,
+    gains: Known,
 }
 
 /// What is to be done once an order is.
@@ -105,6 +139,7 @@ impl<M: RawMutex> Desk<M> {
             board,
             cycles: Watch::new(),
             settle: Wake::new(),
+            connected: AtomicU16::new(0),
             papers: Mutex::new(RefCell::new(Papers {
                 cycle: 0,
                 auth: Auth::new(),
@@ -112,6 +147,9 @@ impl<M: RawMutex> Desk<M> {
                 events,
                 recorder: Recorder::new(Commands::of(machine)),
                 panel: Panel::new(machine),
+                timed: Timed::default(),
+                gains: Known::new(machine),
+                acceptance: Acceptance::default(),
                 keeper,
                 snapshot: None,
                 forget_times: false,
@@ -127,6 +165,17 @@ impl<M: RawMutex> Desk<M> {
         self.cycles.receiver()
     }
 
+    /// One more connection, until it is dropped.
+    pub(super) fn connect(&self) -> Connected<'_> {
+        self.connected.fetch_add(1, Ordering::Relaxed);
+        Connected(&self.connected)
+    }
+
+    /// How many connections there are.
+    pub(super) fn connected(&self) -> u16 {
+        self.connected.load(Ordering::Relaxed)
+    }
+
     pub(super) fn with<R>(&self, f: impl FnOnce(&mut Papers) -> R) -> R {
         self.papers.lock(|papers| f(&mut papers.borrow_mut()))
     }
@@ -136,6 +185,15 @@ impl Papers {
     /// Somebody did something to the simulator.
     pub fn audit(&mut self, text: fmt::Arguments) {
         self.events.add(self.cycle, "audit", text);
+    }
+
+    fn end_faults(&mut self, cycle: u32, commands: &mut Commands) {
+        let Self { timed, events, .. } = self;
+        timed.before(cycle, commands, |fault| {
+            let (word, bit) = fault.name();
+            let (dot, bit) = bit.map_or(("", ""), |bit| (".", bit));
+            events.add(cycle, "audit", format_args!("{word}{dot}{bit} is over"));
+        });
     }
 
     fn order(&mut self, order: Order, then: Then) -> Result<(), Refusal> {
@@ -168,6 +226,10 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
             } else if by_panel {
                 papers.panel.cycle(&image.feedback, &mut image.commands);
             }
+            // A replay has every end of a fault among its commands.
+            if !papers.recorder.is_playing() {
+                papers.end_faults(cycle, &mut image.commands);
+            }
             if papers.forget_times {
                 set_bits(image, command::RESET_TIMES, true);
             }
@@ -191,6 +253,7 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                 set_bits(image, command::RESET_TIMES, false);
             }
             papers.events.look(cycle, image);
+            papers.gains.look(image);
             let replayed = papers
                 .recorder
                 .after(cycle, image)
@@ -222,6 +285,8 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                         cycle,
                         machine: papers.setup.in_use.clone(),
                         panel: papers.panel.clone(),
+                        timed: papers.timed.clone(),
+                        gains: papers.gains.clone(),
                     });
                     papers.recorder.begin(cycle, Beginning::Snapshot, commands);
                 }
@@ -235,13 +300,20 @@ impl<M: RawMutex> Attendant for AtDesk<'_, M> {
                         self.desk.settle.signal(());
                     }
                     papers.panel = snapshot.panel.clone();
+                    papers.gains = snapshot.gains.clone();
+                    papers.timed = snapshot.timed.clone();
+                    papers.timed.shift(cycle.wrapping_sub(snapshot.cycle));
                     match then {
-                        Then::Replay => papers.recorder.play(cycle),
+                        Then::Replay => {
+                            papers.timed = Timed::default();
+                            papers.recorder.play(cycle);
+                        }
                         _ => papers.recorder.begin(cycle, Beginning::Snapshot, commands),
                     }
                 }
                 Some(Then::Rebuild) => {
                     papers.panel = Panel::new(&papers.setup.in_use);
+                    papers.gains = Known::new(&papers.setup.in_use);
                     papers.recorder.begin(cycle, Beginning::PowerUp, commands);
                 }
                 None => {}
@@ -296,11 +368,11 @@ impl<M: RawMutex> Hmi<'_, M> {
         })
     }
 
-    /// Commands several things at once: all of them or none.
+    /// Commands several things at once: all of them or none; faults for a time, if there is one.
     ///
     /// # Errors
-    /// Some are the winder's, and the panel does not control it.
-    pub(super) fn command(&self, settings: &[Setting]) -> Result<(), Refusal> {
+    /// Some are the winder's, and the panel does not control it; the time cannot be.
+    pub(super) fn command(&self, settings: &[Setting], for_s: Option<f64>) -> Result<(), Refusal> {
         let now = Instant::now();
         self.visit(|image, control, papers| {
             let words = |s: &Setting| usize::from(s.signal.word)..usize::from(s.signal.word) + 1;
@@ -315,7 +387,14 @@ impl<M: RawMutex> Hmi<'_, M> {
                     return Err(refusal);
                 }
             }
+            let cycles = match for_s {
+                Some(for_s) => Some(papers.timed.cycles(for_s, settings)?),
+                None => None,
+            };
+            let out = cycles.map(|cycles| papers.cycle.wrapping_add(1).wrapping_add(cycles));
+            let sound = Commands::of(&papers.setup.in_use);
             for setting in settings {
+                papers.timed.put(*setting, &sound, out);
                 let Setting { signal, mask, word } = *setting;
                 let old = image.commands.word(signal);
                 image.commands.set_word(signal, old & !mask | word & mask);

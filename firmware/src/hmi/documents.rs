@@ -7,7 +7,6 @@ use core::fmt;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_time::Instant;
 use model_core::drive::DRIVE_PERIOD_MS;
-use model_core::exchange::TuneStep;
 use model_core::image::{self, COMMAND_WORDS, Direction, Kind, SIGNALS, Signal};
 use model_core::logic::LOOPS;
 use model_core::machine::{PRESETS, Value, parameters};
@@ -17,9 +16,9 @@ use picoserve::io::Write;
 
 use super::Hmi;
 use super::answer::{Document, List, OrNull, Out, Text};
-use super::desk::locked;
+use super::desk::{Memory, locked};
 use super::recorder::Beginning;
-use super::{settings, setup};
+use super::{acceptance, settings, setup};
 use crate::link::control::{Client, Controller, POLL_EDGES_MS, Peer, Writer};
 
 /// The name in lists.
@@ -36,6 +35,7 @@ pub enum What {
     Info { logged_in: bool },
     Signals,
     Image,
+    Faults,
     Panel,
     Parameters,
     Presets,
@@ -46,6 +46,7 @@ pub enum What {
     Snapshot,
     Journal,
     Health,
+    Acceptance,
 }
 
 /// A document, and what it is about.
@@ -67,6 +68,7 @@ impl<M: RawMutex> Document for Page<'_, M> {
             What::Info { logged_in } => self.info(out, logged_in).await,
             What::Signals => signals(out).await,
             What::Image => self.image(out).await,
+            What::Faults => self.faults(out).await,
             What::Panel => self.panel(out).await,
             What::Parameters => self.parameters(out).await,
             What::Presets => presets(out).await,
@@ -77,6 +79,7 @@ impl<M: RawMutex> Document for Page<'_, M> {
             What::Snapshot => self.snapshot(out).await,
             What::Journal => self.journal(out).await,
             What::Health => self.health(out).await,
+            What::Acceptance => acceptance::write(self.hmi, out).await,
         }
     }
 }
@@ -136,6 +139,28 @@ impl<M: RawMutex> Page<'_, M> {
         out.put(format_args!("{},", List(commands.iter()))).await?;
         out.put(format_args!("\"feedback\":{}}}", List(feedback.iter())))
             .await
+    }
+
+    async fn faults<W: Write>(&self, out: &mut Out<W>) -> Result<(), W::Error> {
+        let (cycle, timed) = self
+            .hmi
+            .desk
+            .with(|papers| (papers.cycle, papers.timed.clone()));
+        let timed = timed.iter().map(|fault| {
+            fmt::from_fn(move |f| {
+                let (word, bit) = fault.name();
+                let (dot, bit) = bit.map_or(("", ""), |bit| (".", bit));
+                // The cycle that is told is over.
+                let left = seconds(fault.left(cycle.wrapping_add(1)));
+                write!(f, "{{\"name\":\"{word}{dot}{bit}\",\"left_s\":{left}}}")
+            })
+        });
+        out.put(format_args!("{{\"timed\":[")).await?;
+        for (i, fault) in timed.enumerate() {
+            let comma = if i == 0 { "" } else { "," };
+            out.put(format_args!("{comma}{fault}")).await?;
+        }
+        out.put(format_args!("]}}")).await
     }
 
     async fn panel<W: Write>(&self, out: &mut Out<W>) -> Result<(), W::Error> {
@@ -226,37 +251,23 @@ impl<M: RawMutex> Page<'_, M> {
         out.put(format_args!("]}}]}}")).await
     }
 
-    /// Of the loops that have been tuned; the tuner tells of one at a time.
     async fn gains<W: Write>(&self, out: &mut Out<W>) -> Result<(), W::Error> {
-        let (_, image) = self.hmi.moment();
-        let f = &image.feedback;
-        let tuned = usize::from(image.commands.word(&image::AUTOTUNE_LOOP));
-        let value = |signal| f.get::<f32>(signal);
-        let done = f.word(&image::AUTOTUNE_STEP) == TuneStep::Done as u16;
-        let (gain, time, source) = match done {
-            true => (
-                &image::AUTOTUNE_GAIN_NEW,
-                &image::AUTOTUNE_TIME_NEW,
-                "auto-tune",
-            ),
-            false => (
-                &image::AUTOTUNE_GAIN_OLD,
-                &image::AUTOTUNE_TIME_OLD,
-                "machine",
-            ),
-        };
+        let all = self
+            .hmi
+            .visit(|image, _, papers| papers.gains.settings(&image.feedback));
         out.put(format_args!("{{\"loops\":[")).await?;
-        let told = value(gain) > 0.0;
-        if let Some(name) = LOOPS.get(tuned).filter(|_| told) {
-            let unit = match tuned {
+        for (i, (name, (setting, tuned))) in LOOPS.iter().zip(all).enumerate() {
+            let unit = match i {
                 2 => "N/N",
                 _ => "N·m·s/rad",
             };
             out.put(format_args!(
-                "{{\"name\":{},\"gain\":{},\"time_s\":{},\"unit\":\"{unit}\",\"source\":\"{source}\"}}",
+                "{}{{\"name\":{},\"gain\":{},\"time_s\":{},\"unit\":\"{unit}\",\"source\":\"{}\"}}",
+                if i == 0 { "" } else { "," },
                 Text(name),
-                value(gain),
-                value(time)
+                finite(setting.gain),
+                finite(setting.time),
+                if tuned { "auto-tune" } else { "machine" }
             ))
             .await?;
         }
@@ -456,7 +467,7 @@ impl<M: RawMutex> Page<'_, M> {
         }
         out.put(format_args!(
             "{{\"name\":\"logic\",\"period_us\":{},\"longest_us\":null,\"jitter_us\":null,\"overruns\":{}}}],\
-             \"reset_reason\":{},\"version\":{},\"board\":{},\"uptime_s\":{}}}",
+             \"reset_reason\":{},\"version\":{},\"board\":{},\"uptime_s\":{},",
             1000 * DRIVE_PERIOD_MS,
             f.word(&image::LOGIC_OVERRUNS),
             Text(board.reset),
@@ -464,8 +475,47 @@ impl<M: RawMutex> Page<'_, M> {
             Text(board.name),
             seconds(cycle)
         ))
+        .await?;
+        let memory = (board.memory)().map(|memory| {
+            fmt::from_fn(move |f| {
+                let Memory {
+                    statics,
+                    stack,
+                    stack_used,
+                } = memory;
+                write!(
+                    f,
+                    "{{\"static_ram\":{statics},\"stack\":{stack},\"stack_used_at_most\":{stack_used},\"heap\":0}}"
+                )
+            })
+        });
+        let (clients, recorded) = self
+            .hmi
+            .visit(|_, control, papers| (control.clients().count(), papers.recorder.len()));
+        let places = [
+            (
+                "browsers",
+                usize::from(self.hmi.desk.connected()),
+                usize::from(board.connections),
+            ),
+            ("modbus", clients, crate::link::control::Control::CLIENTS),
+            ("recording", recorded, super::recorder::ENTRIES),
+        ];
+        let places = places.map(|(name, used, of)| {
+            fmt::from_fn(move |f| write!(f, "{{\"name\":\"{name}\",\"used\":{used},\"of\":{of}}}"))
+        });
+        out.put(format_args!(
+            "\"memory\":{},\"places\":{}}}",
+            OrNull(memory),
+            List(places.iter())
+        ))
         .await
     }
+}
+
+/// A number, or null: JSON has no other.
+fn finite(value: f32) -> OrNull<f32> {
+    OrNull(value.is_finite().then_some(value))
 }
 
 /// Simulated time, s.

@@ -15,11 +15,15 @@
 //! | `setup` | the machine's parameters, staged and applied as one |
 //! | `settings` | what the board remembers, and whether it does |
 //! | [`panel`] | the operator panel's sequence |
+//! | `gains` | the regulators' gains |
+//! | `timed` | faults that end by themselves |
+//! | `acceptance` | the acceptance run that the page asks for |
 //! | `events`, `recorder` | what has happened, and every command with its cycle |
 
 // A refusal with its details has no heap to be put on.
 #![allow(clippy::result_large_err, clippy::large_enum_variant)]
 
+mod acceptance;
 mod answer;
 pub mod assets;
 mod auth;
@@ -27,6 +31,7 @@ mod body;
 pub mod desk;
 mod documents;
 mod events;
+mod gains;
 mod guard;
 mod live;
 pub mod panel;
@@ -34,6 +39,7 @@ mod recorder;
 pub mod routes;
 mod settings;
 mod setup;
+mod timed;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use picoserve::io::Socket;
@@ -103,6 +109,7 @@ pub async fn serve<Runtime, S: Socket<Runtime>, M: RawMutex>(
         answered: &answered,
     };
     let app = Router::from_service(routes);
+    let _connected = hmi.desk.connect();
     // However it ended: the connection is gone.
     let _ = Server::custom(&app, Clock, &CONFIG, buffer)
         .serve(socket)

@@ -10,6 +10,7 @@ use core::f32::consts::PI;
 use core::fmt;
 
 use heapless::Vec;
+use model_core::desk::request;
 use model_core::drive::DRIVE_PERIOD_MS;
 use model_core::exchange::TuneStep;
 use model_core::image::{self, Commands, Feedback};
@@ -59,7 +60,30 @@ pub enum Action {
     Autotune(u16),
     /// Drives off, at standstill: what comes before the panel is left.
     SwitchOff,
+    /// One thing at a time, as an operator of a PLC asks for it: drives on.
+    SwitchOn,
+    /// An empty core.
+    NewCore,
+    /// A parent roll, and its diameter as the operator has measured it.
+    NewParentRoll,
+    /// The web led through.
+    LeadWeb,
+    /// The web taken out.
+    RemoveWeb,
 }
+
+/// Push-buttons of the operator's desk, which the panel follows where no PLC does, but for run, stop and the counter.
+const BUTTONS: [(u16, Action); 9] = [
+    (request::EMERGENCY_STOP, Action::EmergencyStop),
+    (request::DRIVES_OFF, Action::SwitchOff),
+    (request::ACKNOWLEDGE, Action::Acknowledge),
+    (request::NEW_CORE, Action::NewCore),
+    (request::NEW_PARENT_ROLL, Action::NewParentRoll),
+    (request::WEB_REMOVED, Action::RemoveWeb),
+    (request::DRIVES_ON, Action::SwitchOn),
+    (request::WEB_LED, Action::LeadWeb),
+    (request::THREAD, Action::Thread),
+];
 
 /// As an operator says it.
 impl fmt::Display for Action {
@@ -74,6 +98,11 @@ impl fmt::Display for Action {
             Self::NewSet => "new set",
             Self::Autotune(_) => "auto-tune",
             Self::SwitchOff => "switch off",
+            Self::SwitchOn => "switch on",
+            Self::NewCore => "new core",
+            Self::NewParentRoll => "new parent roll",
+            Self::LeadWeb => "web led through",
+            Self::RemoveWeb => "web taken out",
         })?;
         match self {
             Self::Run(Order { v_set_m_min, goal }) => {
@@ -180,6 +209,7 @@ enum Step {
     RemoveWeb,
     NewRolls,
     NewCore,
+    NewParentRoll,
     Preset,
     SwitchOn,
     LeadWeb,
@@ -200,6 +230,7 @@ impl Step {
             Self::RemoveWeb => "taking the web out",
             Self::NewRolls => "putting in a core and a parent roll",
             Self::NewCore => "putting in a core",
+            Self::NewParentRoll => "putting in a parent roll",
             Self::Preset => "the drive takes over the parent roll's diameter",
             Self::SwitchOn => "switching the drives on",
             Self::LeadWeb => "leading the web through",
@@ -219,6 +250,7 @@ impl Step {
             Self::RemoveWeb => command::WEB_REMOVED,
             Self::NewRolls => command::NEW_CORE | command::NEW_PARENT_ROLL,
             Self::NewCore => command::NEW_CORE,
+            Self::NewParentRoll => command::NEW_PARENT_ROLL,
             Self::Preset => command::PRESET_ACCEPT,
             Self::LeadWeb => command::WEB_THREADED,
             Self::Thread | Self::Tension => command::THREAD,
@@ -315,6 +347,14 @@ pub struct Panel {
     v_set_m_min: Option<f32>,
     tune: u16,
     goal: Goal,
+    /// The set that runs, or has run last, has come to its goal.
+    at_goal: bool,
+    /// Sets that have.
+    sets: u16,
+    /// Diameter of the parent roll as the operator has measured it, mm; 0 is a full one.
+    measured_mm: f32,
+    /// Push-buttons of the desk that are pressed.
+    pressed: u16,
     message: &'static str,
 }
 
@@ -332,6 +372,10 @@ impl Panel {
             v_set_m_min: None,
             tune: 0,
             goal: Goal::default(),
+            at_goal: false,
+            sets: 0,
+            measured_mm: 0.0,
+            pressed: u16::MAX,
             message: "",
         }
     }
@@ -372,12 +416,22 @@ impl Panel {
             && is(feedback, status::ZERO_SPEED);
         let web = is(feedback, status::WEB_THREADED);
         let ok = match action {
-            Action::Prepare | Action::NewSet | Action::SwitchOff => at_rest,
+            Action::Prepare
+            | Action::NewSet
+            | Action::SwitchOff
+            | Action::SwitchOn
+            | Action::NewCore
+            | Action::NewParentRoll
+            | Action::LeadWeb
+            | Action::RemoveWeb => at_rest,
             Action::Autotune(loop_) => at_rest && usize::from(loop_) < LOOPS.len(),
             Action::Thread => {
                 state == State::Ready || state == State::Threaded && mode(feedback) == Mode::Stall
             }
-            Action::Run(_) => matches!(state, State::Threaded | State::Running),
+            Action::Run(_) => {
+                let tight = state == State::Threading && is(feedback, status::TENSION_DETECTED);
+                tight || matches!(state, State::Threaded | State::Running)
+            }
             Action::Stop => !matches!(state, State::Off | State::Ready),
             Action::Acknowledge => self.steps.is_empty(),
             Action::EmergencyStop => true,
@@ -443,6 +497,7 @@ impl Panel {
                 self.v_set_m_min = order.v_set_m_min.or(self.v_set_m_min);
                 // a set that runs takes another speed or goal without a new start
                 if self.steps.first() != Some(&Run) {
+                    self.at_goal = false;
                     self.begin(feedback, [Some(Run), Some(Stop)]);
                 }
             }
@@ -450,12 +505,18 @@ impl Panel {
             Action::EmergencyStop => self.begin(feedback, [Some(EmergencyStop), Some(SwitchOff)]),
             Action::Acknowledge => self.begin(feedback, [Some(Acknowledge)]),
             Action::SwitchOff => self.begin(feedback, [Some(SwitchOff)]),
+            Action::SwitchOn => self.begin(feedback, [Some(SwitchOn)]),
+            Action::NewCore => self.begin(feedback, [Some(NewCore)]),
+            Action::NewParentRoll => self.begin(feedback, [Some(NewParentRoll), Some(Preset)]),
+            Action::LeadWeb => self.begin(feedback, [Some(LeadWeb)]),
+            Action::RemoveWeb => self.begin(feedback, [Some(RemoveWeb)]),
         }
         Ok(())
     }
 
     /// One drive cycle: what the drives say, what to command. The simulator's own words stay as they are.
     pub fn cycle(&mut self, feedback: &Feedback, commands: &mut Commands) {
+        self.follow_desk(feedback, commands);
         let tension: f32 = feedback.get(&image::TENSION);
         let stall: f32 = commands.get(&image::STALL_SET);
         self.settled = match (tension - stall).abs() <= SETTLED_BAND * stall {
@@ -468,6 +529,7 @@ impl Panel {
             if fault != 0 && !step.bears_faults() {
                 self.give_up(Fault::ALL.get(usize::from(fault)).map_or("", |f| f.name()));
             } else if self.since >= STEP && self.finished(step, feedback, commands) {
+                self.at_goal |= step == Step::Run && self.time_to_stop(feedback, commands);
                 self.next(feedback);
             } else if let Some(refusal) = self.refused(feedback) {
                 self.give_up(refusal.name());
@@ -491,9 +553,56 @@ impl Panel {
             commands.set_word(signal, self.stw1);
         }
         commands.set_word(&image::AUTOTUNE_LOOP, self.tune);
-        commands.set(&image::D_PRESET_UW, self.numbers.parent_mm);
+        commands.set(&image::D_PRESET_UW, self.preset_mm());
+        commands.set_word(&image::PLC_SETS, self.sets);
         if let Some(v_set_m_min) = self.v_set_m_min {
             commands.set(&image::V_SET, v_set_m_min);
+        }
+    }
+
+    /// The parent roll's diameter as the drive shall take it over, mm.
+    fn preset_mm(&self) -> f32 {
+        match self.measured_mm > 0.0 {
+            true => self.measured_mm,
+            false => self.numbers.parent_mm,
+        }
+    }
+
+    /// The push-buttons and set-points of the operator's desk count here, where no PLC reads them.
+    fn follow_desk(&mut self, feedback: &Feedback, commands: &mut Commands) {
+        self.measured_mm = commands.get(&image::OPERATOR_PARENT);
+        let now = commands.word(&image::OPERATOR_REQUEST);
+        let pressed = now & !core::mem::replace(&mut self.pressed, now);
+        if pressed & request::RESET_SETS != 0 {
+            self.sets = 0;
+        }
+        let set = |signal| Some(commands.get::<f32>(signal)).filter(|value| *value > 0.0);
+        let tension = set(&image::OPERATOR_TENSION_SET);
+        let order = Order {
+            v_set_m_min: set(&image::OPERATOR_V_SET),
+            goal: Goal {
+                length_m: set(&image::OPERATOR_LENGTH_SET),
+                diameter_mm: set(&image::OPERATOR_DIAMETER_SET),
+            },
+        };
+        let others = [
+            (request::STOP, Action::Stop),
+            (request::RUN, Action::Run(order)),
+        ];
+        for (button, action) in BUTTONS.into_iter().chain(others) {
+            if pressed & button == 0 {
+                continue;
+            }
+            match self.act(action, feedback) {
+                Ok(()) if button == request::RUN => {
+                    if let Some(tension) = tension {
+                        commands.set(&image::TENSION_SET, tension);
+                    }
+                }
+                Ok(()) => {}
+                Err(Wrong::NotNow(_)) => self.message = "not now",
+                Err(Wrong::Outside { .. }) => self.message = "the desk asks for more than there is",
+            }
         }
     }
 
@@ -550,6 +659,8 @@ impl Panel {
         let done = self.steps.remove(0);
         if self.steps.is_empty() {
             self.word = done.word() & command::THREAD;
+            let wound = done == Step::Stop && core::mem::take(&mut self.at_goal);
+            self.sets = self.sets.wrapping_add(u16::from(wound));
             self.message = match done {
                 Step::Stop => "the machine stands",
                 Step::Tension => "the web is under tension",
@@ -591,7 +702,9 @@ impl Panel {
             Step::Acknowledge => feedback.word(&image::FAULT) == Fault::None as u16,
             Step::RemoveWeb => !is(status::WEB_THREADED),
             Step::NewRolls | Step::NewCore => near(&image::D_WU, self.numbers.core_mm),
-            Step::Preset => is(status::PRESET_TAKEN) && near(&image::D_UW, self.numbers.parent_mm),
+            // A parent roll that is put in takes the preset away.
+            Step::NewParentRoll => !is(status::PRESET_TAKEN),
+            Step::Preset => is(status::PRESET_TAKEN) && near(&image::D_UW, self.preset_mm()),
             Step::SwitchOn => drives(zsw1::OPERATION_ENABLED) && is(status::DRIVES_ON),
             Step::LeadWeb => is(status::WEB_THREADED),
             Step::Thread => is(status::TENSION_DETECTED),

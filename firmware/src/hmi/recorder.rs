@@ -6,7 +6,7 @@ use heapless::Vec;
 use model_core::image::{self, Commands, Image};
 
 /// Commands that are recorded; then the recording has its end.
-const ENTRIES: usize = 8192;
+pub const ENTRIES: usize = 8192;
 
 /// A word of the command block, and from which cycle after the beginning on it counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,6 +148,11 @@ impl Recorder {
     /// There was no room for all commands.
     pub fn is_full(&self) -> bool {
         self.full
+    }
+
+    /// How many entries it has.
+    pub fn len(&self) -> usize {
+        self.entries.len()
     }
 
     /// Its entry of a number.

@@ -66,6 +66,8 @@ enum Action {
     Keep,
     Restore { replay: bool },
     ForgetTimes,
+    AskAcceptance,
+    ReportAcceptance,
     SetPassword,
     LogIn,
     LogOut,
@@ -108,6 +110,7 @@ pub static ROUTES: &[Route] = routes! {
     Get    "image"             anybody Action::Show(What::Image), "the process image of one drive cycle, word by word";
     Get    "live"              anybody Action::Stream, "a WebSocket: signals as a stream";
     Post   "commands"          session Action::Command, "sets commands by name, in counts; those of the winder while the panel controls it";
+    Get    "faults"            anybody Action::Show(What::Faults), "the faults that end by themselves, and when";
     Get    "panel"             anybody Action::Show(What::Panel), "what the operator panel does";
     Post   "panel"             session Action::Panel, "asks the operator panel for something";
     Get    "parameters"        anybody Action::Show(What::Parameters), "the machine's parameters, in use and staged";
@@ -120,7 +123,7 @@ pub static ROUTES: &[Route] = routes! {
     Put    "settings"          session Action::Connect, "network and serial line for the next start";
     Post   "settings/overwrite" session Action::Overwrite, "what is in use takes the place of what is of no use in the flash";
     Delete "settings"          session Action::ResetSettings, "empties the flash: the next start has the defaults";
-    Get    "gains"             anybody Action::Show(What::Gains), "the gains of the loop that auto-tune has looked at";
+    Get    "gains"             anybody Action::Show(What::Gains), "the gains of all loops at the present diameters, and whether auto-tune has set them";
     Get    "link"              anybody Action::Show(What::Link), "the links' clients, and who wrote which command last";
     Get    "events"            anybody Action::Events, "what has happened, after the event of the number `after`";
     Get    "snapshot"          anybody Action::Show(What::Snapshot), "whether there is a snapshot, and of what the recording is";
@@ -128,8 +131,11 @@ pub static ROUTES: &[Route] = routes! {
     Post   "restore"           session Action::Restore { replay: false }, "goes on from the snapshot";
     Post   "replay"            session Action::Restore { replay: true }, "goes on from the snapshot with what was commanded since";
     Get    "journal"           anybody Action::Show(What::Journal), "the recording as CSV; from power-up, the command line tool can replay it";
-    Get    "health"            anybody Action::Show(What::Health), "the times of the tasks, why the board has started";
+    Get    "health"            anybody Action::Show(What::Health), "the times of the tasks, memory and places in use, why the board has started";
     Post   "health/reset"      session Action::ForgetTimes, "forgets the worst times and the overruns";
+    Get    "acceptance"        anybody Action::Show(What::Acceptance), "the acceptance run that was asked for, and what it has found";
+    Post   "acceptance"        session Action::AskAcceptance, "asks for an acceptance run, or takes it back";
+    Post   "acceptance/report" session Action::ReportAcceptance, "its runner tells where it is";
     Post   "password"          anybody Action::SetPassword, "sets the password: the first anybody, another who has logged in";
     Post   "login"             anybody Action::LogIn, "begins a session";
     Post   "logout"            anybody Action::LogOut, "ends the session";
@@ -225,7 +231,10 @@ impl<'a, M: RawMutex> Routes<'a, M> {
             }
             Action::Show(what) => return show(what),
             Action::Stream => return Err(Refusal::new(426, format_args!("this is a WebSocket"))),
-            Action::Command => hmi.command(&body::commands(body)?)?,
+            Action::Command => {
+                let wanted = body::commands(body)?;
+                hmi.command(&wanted.settings, wanted.for_s)?;
+            }
             Action::Panel => self.panel(&body::read(body)?)?,
             Action::Stage => {
                 let mut values = Values::default();
@@ -246,6 +255,8 @@ impl<'a, M: RawMutex> Routes<'a, M> {
             Action::Keep => hmi.keep()?,
             Action::Restore { replay } => hmi.restore(replay)?,
             Action::ForgetTimes => hmi.desk.with(|papers| papers.forget_times = true),
+            Action::AskAcceptance => hmi.ask_acceptance(body)?,
+            Action::ReportAcceptance => hmi.report_acceptance(body)?,
             Action::SetPassword => return self.set_password(body, may).await,
             Action::LogIn => return self.log_in(body).await,
             Action::LogOut => {

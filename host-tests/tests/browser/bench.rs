@@ -8,7 +8,7 @@ use host_tests::link::Link;
 use host_tests::log::Log;
 use host_tests::setup;
 use host_tests::simulator::{Board, Options, Simulator};
-use model_core::image::{Feedback, Signal};
+use model_core::image::{Commands, Feedback, Signal};
 use model_core::logic::Mode;
 
 use crate::chromium::{Chromium, Page, button};
@@ -128,6 +128,13 @@ impl Bench {
     pub fn feedback(&mut self) -> Feedback {
         self.link
             .read()
+            .unwrap_or_else(|error| panic!("{error:#}\n{}", self.log.last(20)))
+    }
+
+    /// What stands in the command block.
+    pub fn commands(&mut self) -> Commands {
+        self.link
+            .read_commands()
             .unwrap_or_else(|error| panic!("{error:#}\n{}", self.log.last(20)))
     }
 

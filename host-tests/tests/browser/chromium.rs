@@ -260,6 +260,31 @@ impl Page {
         self.call("Input.insertText", json!({ "text": text }));
     }
 
+    /// Chooses in the list of this name, by the choice's value.
+    #[track_caller]
+    pub fn choose(&mut self, name: &str, value: &str) {
+        let list = field(name);
+        self.until(&format!("!!{list}"));
+        self.eval(&format!(
+            "(() => {{ const e = {list}; e.value = {}; \
+             e.dispatchEvent(new Event('change', {{ bubbles: true }})); return e.value; }})()",
+            json!(value)
+        ));
+    }
+
+    /// Gives a file to the field of this name, as somebody who chooses it.
+    #[track_caller]
+    pub fn upload(&mut self, name: &str, file: &str, content: &[u8]) {
+        let path = self.downloads.join(file);
+        fs::write(&path, content).expect("a file");
+        let answer = self.call("Runtime.evaluate", json!({ "expression": field(name) }));
+        let object = &answer["result"]["objectId"];
+        self.call(
+            "DOM.setFileInputFiles",
+            json!({ "files": [path], "objectId": object }),
+        );
+    }
+
     /// Presses a key.
     #[track_caller]
     pub fn key(&mut self, key: &str) {
@@ -306,13 +331,19 @@ impl Page {
     /// The content of the file that the page gives to its user, once it is whole.
     #[track_caller]
     pub fn download(&mut self, name: &str) -> String {
+        String::from_utf8(self.download_bytes(name)).expect("text")
+    }
+
+    /// As [`Self::download`], whatever it is.
+    #[track_caller]
+    pub fn download_bytes(&mut self, name: &str) -> Vec<u8> {
         let file = self.downloads.join(name);
         let began = Instant::now();
         while !file.exists() {
             assert!(began.elapsed() < PATIENCE, "no {name}");
             thread::sleep(PAUSE);
         }
-        fs::read_to_string(&file).expect("text")
+        fs::read(&file).expect("a file")
     }
 
     /// The events of a kind so far.
@@ -389,6 +420,21 @@ impl Page {
             .filter(|(role, _)| OPERATED.contains(&role.as_str()))
             .collect()
     }
+}
+
+/// An answer of the interface to somebody without a browser.
+pub fn get(at: std::net::SocketAddr, path: &str) -> String {
+    use std::io::{Read, Write};
+    let mut stream = TcpStream::connect(at).expect("a place");
+    stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
+    write!(
+        stream,
+        "GET {path} HTTP/1.1\r\nHost: {at}\r\nConnection: close\r\n\r\n"
+    )
+    .expect("sent");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("an answer");
+    answer
 }
 
 /// The first button, link or switch whose text begins with a name.

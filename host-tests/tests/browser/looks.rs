@@ -7,7 +7,7 @@ use host_tests::setup;
 use crate::bench::{Bench, LIVE};
 use crate::chromium::Page;
 
-const PAGES: [&str; 9] = [
+const PAGES: [&str; 11] = [
     "machine",
     "trends",
     "parameters",
@@ -16,6 +16,8 @@ const PAGES: [&str; 9] = [
     "faults",
     "link",
     "session",
+    "training",
+    "acceptance",
     "health",
 ];
 /// Phone, tablet, desktop, and in the dark: width and height, px, and whether it is dark.

@@ -7,6 +7,8 @@
 
 mod bench;
 mod chromium;
+mod files;
+mod load;
 mod looks;
 mod settings;
 mod work;

@@ -1,4 +1,5 @@
-//! Memory of which the core must know something: what stays out of the caches, and what may not be readable.
+//! Memory of which the core must know something: what stays out of the caches, what may not be readable, how deep the
+//! stack has been.
 //!
 //! Not here: which memories those are. Source: Armv7-M architecture reference manual, B3.5 (protected memory system),
 //! B3.2.8 and B3.2.15 (configuration and control, configurable fault status).
@@ -10,6 +11,54 @@ use core::arch::asm;
 use core::ops::Range;
 
 use cortex_m::peripheral::{MPU, SCB};
+use firmware::hmi::desk::Memory;
+
+// Symbols of the linker's scripts; only their addresses mean something.
+unsafe extern "C" {
+    static _stack_end: u32;
+    static _stack_start: u32;
+    static __sdata: u32;
+    static __ebss: u32;
+}
+
+/// What stands in words of the stack that were never used; no address and no small number.
+const UNUSED: u32 = 0x5ac3_96e5;
+/// Left free below the stack pointer while painting, bytes: what painting itself may need.
+const OWN: u32 = 512;
+/// Only one word of so many is looked at, so that looking takes no time that anybody waits for.
+const STRIDE: u32 = 32;
+
+/// Fills the unused stack, so that it can be seen later how deep it has been.
+///
+/// # Safety
+/// The main stack is that of the linker's script and in use; no interrupt comes meanwhile.
+pub unsafe fn paint_stack() {
+    let mut at = (&raw const _stack_end) as u32;
+    let end = cortex_m::register::msp::read() - OWN;
+    while at < end {
+        // SAFETY: between the stack's end and what is in use of it, nothing is anybody's.
+        unsafe { (at as *mut u32).write_volatile(UNUSED) };
+        at += 4;
+    }
+}
+
+/// Static variables; the stack, and what has been used of it since it was painted.
+pub fn used() -> Option<Memory> {
+    let (end, start) = (
+        (&raw const _stack_end) as u32,
+        (&raw const _stack_start) as u32,
+    );
+    let mut at = end;
+    // SAFETY: reads words of the stack, whatever stands in them.
+    while at < start && unsafe { (at as *const u32).read_volatile() } == UNUSED {
+        at += STRIDE;
+    }
+    Some(Memory {
+        statics: (&raw const __ebss) as u32 - (&raw const __sdata) as u32,
+        stack: start - end,
+        stack_used: start - at.min(start),
+    })
+}
 
 /// Keeps regions out of the caches, and does not execute what is there; of the rest the core has its own idea. Each is of
 /// a size that is a power of two, and begins at a multiple of it.

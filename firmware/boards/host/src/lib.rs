@@ -47,6 +47,8 @@ const BOARD: desk::Board = desk::Board {
     name: "a process on a PC",
     version: env!("CARGO_PKG_VERSION"),
     reset: "started",
+    connections: CONNECTIONS as u16,
+    memory: || None,
 };
 
 /// Before the next try, when a connection cannot be accepted for want of a file descriptor.

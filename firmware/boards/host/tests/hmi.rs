@@ -468,3 +468,185 @@ fn no_body_does_harm_and_a_refused_one_does_nothing() {
         }
     }
 }
+
+#[test]
+fn a_fault_ends_by_itself_after_its_time() {
+    let board = simulator(20.0);
+    let mut browser = Browser::logged_in(&board);
+    let word = usize::from(image::FAULT_DRIVES.word);
+    let stands = |browser: &mut Browser| browser.get("image")["commands"][word].clone();
+    let cycle = |value: &Value| value["cycle"].as_u64().unwrap();
+
+    let before = cycle(&browser.get("image"));
+    browser.post(
+        "commands",
+        json!({"fault_drives.trip_uw": 1, "for_s": 20.0}),
+    );
+    let timed = browser.get("faults")["timed"][0].clone();
+    assert_eq!(timed["name"], "fault_drives.trip_uw");
+    let left = timed["left_s"].as_f64().unwrap();
+    assert!(0.0 < left && left <= 20.0, "{left}");
+    // Nobody looks on, and it goes.
+    drop(browser);
+    let mut browser = Browser::new(&board);
+    browser.wait("faults", |faults| faults["timed"] == json!([]));
+    assert_eq!(stands(&mut browser), 0);
+    let events = browser.get("events");
+    let over = events["events"].as_array().unwrap().iter();
+    let over = over.filter(|e| e["text"] == "fault_drives.trip_uw is over");
+    let over: Vec<_> = over.collect();
+    assert_eq!(over.len(), 1);
+    assert!(cycle(over[0]) > before + 2000, "{} after {before}", over[0]);
+}
+
+#[test]
+fn a_time_is_for_faults_and_within_its_limits() {
+    let board = simulator(1.0);
+    let mut browser = Browser::logged_in(&board);
+    for (body, parameter) in [
+        (json!({"fault_web_break": 1, "for_s": 0}), "for_s"),
+        (json!({"fault_web_break": 1, "for_s": 4000}), "for_s"),
+        (json!({"operator_v_set": 1, "for_s": 1}), "operator_v_set"),
+    ] {
+        let (status, value) = browser.ask("POST", "commands", Some(body));
+        assert_eq!(status, 422, "{value}");
+        assert_eq!(value["details"][0]["parameter"], parameter);
+    }
+    let word = usize::from(image::FAULT_WEB_BREAK.word);
+    assert_eq!(browser.get("image")["commands"][word], 0);
+}
+
+/// A fault that ends by itself ends in the same cycle of a replay, and after a restore it has as long to go as then.
+#[test]
+fn a_fault_for_a_time_is_part_of_snapshot_and_replay() {
+    let board = simulator(20.0);
+    let mut browser = Browser::logged_in(&board);
+    browser.post("commands", json!({"fault_sensors": 1, "for_s": 100.0}));
+    browser.post("snapshot", json!({}));
+    browser.wait("snapshot", |s| s["taken_cycle"].is_u64());
+    let left = |browser: &mut Browser| browser.get("faults")["timed"][0]["left_s"].as_f64();
+    let then = left(&mut browser).unwrap();
+    browser.wait("faults", |faults| {
+        faults["timed"][0]["left_s"].as_f64().unwrap() < then - 10.0
+    });
+    browser.post("restore", json!({}));
+    browser.wait("faults", |f| {
+        f["timed"][0]["left_s"].as_f64() > Some(then - 10.0)
+    });
+    browser.post("commands", json!({"fault_sensors": 1, "for_s": 2.0}));
+    browser.wait("faults", |faults| faults["timed"] == json!([]));
+    browser.post("replay", json!({}));
+    let said = |kind: &'static str| {
+        move |events: &Value| {
+            let mut events = events["events"].as_array().unwrap().iter();
+            events.any(|e| e["kind"] == kind)
+        }
+    };
+    let events = browser.wait("events", said("replay"));
+    let mut events = events["events"].as_array().unwrap().iter();
+    let replay = events.find(|e| e["kind"] == "replay").unwrap();
+    assert_eq!(replay["text"], "the replay is the recorded run to the bit");
+}
+
+/// As a page asks, a runner without a browser reports, and the page reads.
+#[test]
+fn an_acceptance_run_is_asked_for_reported_and_read() {
+    let board = simulator(1.0);
+    let mut page = Browser::logged_in(&board);
+    let nothing = page.get("acceptance");
+    assert_eq!(nothing["state"], "none");
+    assert_eq!(nothing["runner"], Value::Null);
+    page.post("acceptance", json!({"run": true}));
+    let asked = page.get("acceptance");
+    assert_eq!(
+        (&asked["state"], &asked["request"]),
+        (&json!("asked"), &json!(1))
+    );
+
+    let mut runner = Browser::new(&board);
+    let waiting = json!({"runner": "pc 7", "state": "waiting"});
+    let (status, _) = runner.ask("POST", "acceptance/report", Some(waiting.clone()));
+    assert_eq!(status, 401);
+    runner.post("login", json!({"password": PASSWORD}));
+    runner.post("acceptance/report", waiting);
+    assert_eq!(page.get("acceptance")["runner"], "pc 7");
+    let mut report = json!({"runner": "pc 7", "request": 1, "state": "running", "share": 0.25,
+        "text": "thread", "checks": [{"id": "L01", "state": "failed", "text": "0.4 s without"}]});
+    runner.post("acceptance/report", report.clone());
+    let running = page.get("acceptance");
+    assert_eq!(
+        running,
+        json!({"request": 1, "state": "running", "runner": "pc 7", "share": 0.25, "text": "thread",
+            "checks": [{"id": "L01", "state": "failed", "text": "0.4 s without"}]})
+    );
+    report["state"] = json!("maybe");
+    let (status, _) = runner.ask("POST", "acceptance/report", Some(report.clone()));
+    assert_eq!(status, 422);
+    assert_eq!(page.get("acceptance"), running);
+    page.post("acceptance", json!({"run": false}));
+    report["state"] = json!("running");
+    let (status, value) = runner.ask("POST", "acceptance/report", Some(report));
+    assert_eq!(
+        (status, &value["details"][0]["parameter"]),
+        (409, &json!("request"))
+    );
+}
+
+/// What auto-tune tells of its loop is what the list of all loops has of it, before and after.
+#[test]
+fn the_gains_of_all_loops_are_those_that_the_drive_reports() {
+    let board = simulator(20.0);
+    let mut browser = Browser::logged_in(&board);
+    let near = |listed: &Value, word: &image::Signal, image: &Value| {
+        let words = &image["feedback"];
+        let at = |i: u16| words[usize::from(word.word + i)].as_u64().unwrap() as f64;
+        let counts = match word.kind {
+            image::Kind::U32 => 65536.0 * at(0) + at(1),
+            _ => at(0),
+        };
+        let (reported, listed) = (counts / f64::from(word.counts), listed.as_f64().unwrap());
+        let resolution = 1.0 / f64::from(word.counts);
+        assert!(
+            (listed - reported).abs() < 1e-3 * reported + resolution,
+            "{}: {listed}, reported {reported}",
+            word.name
+        );
+    };
+    browser.post("panel", json!({"action": "take"}));
+    browser.post("panel", json!({"action": "prepare"}));
+    browser.wait("panel", |panel| panel["state"] == "ready");
+    for number in 0..3 {
+        let before = browser.get("gains")["loops"][number].clone();
+        assert_eq!(before["source"], "machine");
+        browser.post("panel", json!({"action": "autotune", "loop": number}));
+        let tuned = browser.wait("gains", |g| g["loops"][number]["source"] == "auto-tune");
+        let after = &tuned["loops"][number];
+        let image = browser.get("image");
+        near(&before["gain"], &image::AUTOTUNE_GAIN_OLD, &image);
+        near(&after["gain"], &image::AUTOTUNE_GAIN_NEW, &image);
+        near(&after["time_s"], &image::AUTOTUNE_TIME_NEW, &image);
+        browser.wait("panel", |panel| panel["state"] != "tuning");
+        let state = browser.get("panel")["state"].clone();
+        if state != "off" && state != "ready" {
+            browser.post("panel", json!({"action": "stop"}));
+            browser.wait("panel", |panel| panel["message"] == "the machine stands");
+        }
+    }
+}
+
+#[test]
+fn health_tells_what_is_in_use() {
+    let board = simulator(1.0);
+    let mut browser = Browser::new(&board);
+    let health = browser.get("health");
+    // A process on a PC has no memory of its own to tell of.
+    assert_eq!(health["memory"], Value::Null);
+    let places = health["places"].as_array().unwrap();
+    let of = |name| places.iter().find(|place| place["name"] == name).unwrap();
+    assert_eq!(of("browsers")["used"], 1);
+    assert_eq!(of("browsers")["of"], CONNECTIONS);
+    let mut other = Browser::new(&board);
+    other.get("info");
+    let places = browser.get("health")["places"].clone();
+    assert_eq!(places[0]["used"], 2, "{places}");
+}

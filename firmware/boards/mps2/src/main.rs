@@ -65,6 +65,8 @@ fn main() -> ! {
         unreachable!("the entry point runs once")
     };
     failure::guard_stack(&mut core.MPU);
+    // SAFETY: nothing runs yet but this, on the stack that the linker's script has.
+    unsafe { board_cortex_m::memory::paint_stack() };
     uart_log::start();
     interrupts::set_priorities(&mut core.NVIC);
     time_driver::start();

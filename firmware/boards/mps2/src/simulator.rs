@@ -80,6 +80,8 @@ pub async fn background(machine: &'static Machine, exchange: &'static Exchange, 
         name: "Cortex-M in QEMU (mps2)",
         version: env!("CARGO_PKG_VERSION"),
         reset: Restart::TEXTS[usize::from(given.started.why.number())],
+        connections: (crate::net::HTTP_SOCKETS - 1) as u16,
+        memory: board_cortex_m::memory::used,
     };
     let (_, line) = given.keeper.in_use();
     let desk = &*DESK.init_with(|| LocalDesk::keeping(board, given.keeper));

@@ -74,6 +74,8 @@ fn main() -> ! {
         unreachable!("the entry point runs once")
     };
     memory::prepare(&mut core);
+    // SAFETY: nothing runs yet but this, on the stack that the linker's script has.
+    unsafe { board_cortex_m::memory::paint_stack() };
     let p = embassy_stm32::init(clock::config());
     let started = watchdog::started(reset());
     let why = Restart::TEXTS[usize::from(started.why.number())];
@@ -189,6 +191,8 @@ async fn all_else(machine: &'static Machine, exchange: &'static Exchange, given:
         name: "NUCLEO-H743ZI2",
         version: env!("CARGO_PKG_VERSION"),
         reset: given.why,
+        connections: (links::HTTP_SOCKETS - 1) as u16,
+        memory: board_cortex_m::memory::used,
     };
     let (network, serial) = given.keeper.in_use();
     let desk = &*DESK.init_with(|| LocalDesk::keeping(board, given.keeper));

@@ -18,10 +18,12 @@ const PAGES = [
   ['faults', 'Faults'],
   ['link', 'Link'],
   ['session', 'Session'],
+  ['training', 'Training'],
+  ['acceptance', 'Acceptance'],
   ['health', 'Health'],
 ];
 /** What somebody in training does not see: what is put in, and the simulator's own. */
-const HIDDEN = ['faults', 'session'];
+const HIDDEN = ['faults', 'session', 'acceptance'];
 
 const page = signal('machine');
 const trainee = signal(keep('view') === 'trainee');
@@ -141,7 +143,7 @@ function Account({ logged }) {
             }
             <button type="button" onClick=${leave}>${trainee.value ? 'Leave the trainee view' : 'Trainee view'}</button>
           </div>
-          <p class="quiet">The trainee view shows no faults that are put in, and no snapshots. Leaving it takes the password.</p>
+          <p class="quiet">The trainee view shows no faults that are put in, no snapshots, no acceptance. Leaving it takes the password.</p>
         <//>`
         : null
     }`;

@@ -17,6 +17,8 @@ const PATHS = {
   faults: 'M12 3 2 20h20L12 3ZM12 10v4M12 17v.5',
   link: 'M10 14a4 4 0 0 0 6 0l3-3a4 4 0 0 0-6-6l-1 1M14 10a4 4 0 0 0-6 0l-3 3a4 4 0 0 0 6 6l1-1',
   session: 'M12 7v5l3 2M4 12a8 8 0 1 0 3-6.2L4 8M4 4v4h4',
+  acceptance: 'M9 4h6v3H9ZM8 5H5v16h14V5h-3M8 14l3 3 5-6',
+  training: 'm2 9 10-5 10 5-10 5L2 9Zm4 2v5c3 3 9 3 12 0v-5M22 9v6',
   health: 'M3 12h4l2-6 4 12 2-6h6',
   sun: 'M12 16a4 4 0 1 0 0-8 4 4 0 0 0 0 8ZM12 2v3M12 19v3M2 12h3M19 12h3M5 5l2 2M17 17l2 2M19 5l-2 2M7 17l-2 2',
   moon: 'M20 14A8 8 0 0 1 10 4a8 8 0 1 0 10 10Z',

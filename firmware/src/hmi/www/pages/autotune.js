@@ -70,6 +70,7 @@ export default function Autotune() {
   const mode = counts('mode').value;
   const step = counts('autotune_step').value ?? 0;
   const running = mode === MODE.tune;
+  const moving = ['preparing', 'threading', 'running', 'stopping'].includes(panel?.state);
   const steps = signals.value.get('autotune_step')?.codes ?? [];
   const of = running || step >= STEP.done ? (counts('autotune_loop').value ?? loop) : loop;
   const list = needs(loop);
@@ -100,11 +101,11 @@ export default function Autotune() {
                 by === 'panel'
                   ? running
                     ? html`<button type="button" class="stop" onClick=${() => act('stop')}>Cancel</button>`
-                    : html`<button type="button" class="main"
+                    : html`<button type="button" class="main" disabled=${moving}
                       onClick=${() => act('autotune', { loop })}>Start auto-tune</button>`
                   : html`<button type="button" class="main" onClick=${() => act('take')}>Take control</button>`
               }
-            <span class="quiet">${panel?.message || ''}</span></div>`
+            <span class="quiet">${by === 'panel' && moving ? 'Stop the web first.' : panel?.message || ''}</span></div>`
         }
         <progress max="100" value=${value('autotune_progress') || 0} aria-label="Progress of auto-tune" />
         <ol class="track">${steps.slice(1, STEP.done + 1).map((text, i) => html`<li key=${i}

@@ -38,16 +38,18 @@ export default function Drive() {
           <${Bits} name=${s.name} /></section>`)}
       </div>
       <div class="stack">
-        <${Values} title="Set-points" list=${numbers('command')} />
-        <${Values} title="Feedback" list=${numbers('feedback')} />
         ${
           gains?.loops?.length && tab === 'winder'
-            ? html`<section class="card"><h2>Regulators</h2><table class="values"><tbody>
+            ? html`<section class="card"><h2>Regulators</h2><table class="values"><thead><tr><th>Loop</th>
+              <th class="n">Gain</th><th class="n">Integral time</th><th>From</th></tr></thead><tbody>
               ${gains.loops.map((l) => html`<tr key=${l.name}><td>${sentence(l.name)}</td><td class="n"><b>
-                ${figure(l.gain, l.gain < 10 ? 3 : 0)}</b> ${l.unit}</td><td class="n"><b>${figure(l.time_s, 3)}
-                  </b> s</td></tr>`)}</tbody></table></section>`
+                ${figure(l.gain ?? NaN, l.gain < 10 ? 3 : 0)}</b> ${l.unit}</td><td class="n"><b>
+                  ${figure(l.time_s ?? NaN, 3)}</b> s</td><td>${l.source}</td></tr>`)}</tbody></table>
+              <p class="quiet">At the present diameters.</p></section>`
             : null
         }
+        <${Values} title="Set-points" list=${numbers('command')} />
+        <${Values} title="Feedback" list=${numbers('feedback')} />
       </div>
     </div>`;
 }

@@ -3,10 +3,10 @@
  *
  * Not here: what the drives make of it; the alarm line and the mimic show that. A trainee's view has no such page.
  */
-import { html, useState, useEffect } from '../vendor/ui.js';
+import { html, useState } from '../vendor/ui.js';
 import { attempt } from '../api.js';
 import { signals, counts, value, figure } from '../live.js';
-import { Icon, Field, useLive, sentence } from '../parts.js';
+import { Icon, Field, useGet, useLive, sentence, span } from '../parts.js';
 
 const WORDS = [
   'fault_machine',
@@ -48,46 +48,29 @@ const TITLE = {
   bus_delay: 'Slow bus',
 };
 
-/** Timers of faults that end by themselves, by what they put in; they outlive a change of page. */
-const timers = new Map();
-
-function end(key, body) {
-  timers.delete(key);
-  attempt('POST', 'commands', body);
-}
-
 export default function Faults() {
   useLive(WORDS);
   const [time, setTime] = useState('0');
   const [entries, setEntries] = useState({});
-  const [, tick] = useState(0);
-  useEffect(() => {
-    const timer = setInterval(() => timers.size && tick((n) => n + 1), 500);
-    return () => clearInterval(timer);
-  }, []);
+  // the simulator counts, whether a page looks on or not
+  const [timed, , again] = useGet('faults', 500);
   const put = async (key, on, off) => {
-    clearTimeout(timers.get(key)?.timer);
-    timers.delete(key);
-    const seconds = Number(time);
-    if ((await attempt('POST', 'commands', { [key]: on })) && seconds > 0 && on !== off)
-      timers.set(key, {
-        until: Date.now() + seconds * 1000,
-        timer: setTimeout(() => end(key, { [key]: off }), seconds * 1000),
-      });
+    const seconds = on === off ? 0 : Number(time);
+    const body = seconds ? { [key]: on, for_s: seconds } : { [key]: on };
+    if (await attempt('POST', 'commands', body)) again();
   };
   const rest = (key) => {
-    const one = timers.get(key);
-    return one ? html`<em>${Math.max(0, Math.ceil((one.until - Date.now()) / 1000))} s</em>` : null;
+    const one = timed?.timed.find((fault) => fault.name === key);
+    return one ? html`<em title="ends by itself">${span(Math.ceil(one.left_s))}</em>` : null;
   };
   const active = WORDS.filter((name) => signals.value.has(name)).flatMap((name) => {
     const about = signals.value.get(name);
-    const raw = counts(name).value ?? 0;
+    const raw = counts(name).value;
+    if (raw === null) return [];
     if (about.kind === 'bits') return about.bits.filter((b) => (raw >> b.number) & 1).map((b) => b.description);
     return raw === (SOUND[name] ?? 0) ? [] : [`${TITLE[name]}: ${figure(value(name), 0)} ${about.unit}`];
   });
   const clear = () => {
-    timers.forEach(({ timer }) => clearTimeout(timer));
-    timers.clear();
     attempt(
       'POST',
       'commands',
@@ -110,7 +93,7 @@ export default function Faults() {
             </span>${rest(key)}</button></li>`;
       });
     const sound = SOUND[name] ?? 0;
-    const on = raw !== sound;
+    const on = raw !== sound && counts(name).value !== null;
     const entry = entries[name] ?? String(CLICK[name] / about.counts);
     const n = Number(entry);
     const bad =

@@ -8,7 +8,7 @@ import { get, attempt, save, note } from '../api.js';
 import { cycle, CYCLE_S } from '../live.js';
 import { useGet, span, sentence } from '../parts.js';
 
-const KINDS = ['mode', 'fault', 'refusal', 'command', 'audit'];
+const KINDS = ['mode', 'fault', 'refusal', 'autotune', 'replay', 'settings', 'audit'];
 /** Events that the page keeps. */
 const MOST = 400;
 
