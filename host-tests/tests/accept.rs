@@ -2,18 +2,26 @@
 #![allow(clippy::unwrap_used)]
 
 use firmware::hmi::panel::Panel;
+use host_tests::accept::attend::Page;
 use host_tests::accept::checks::{Miss, markdown};
+mod support;
+
+use std::io::Write;
+use std::process::Stdio;
+use std::thread;
+
 use host_tests::accept::controller::{
     Controller, DemoPlc, Garbage, REFERENCE, Silent, StPlc, Stopping,
 };
 use host_tests::accept::matrix::{golden, rows, table};
 use host_tests::accept::seeds::SEEDS;
 use host_tests::accept::world::{LIMIT_S, Lockstep};
-use host_tests::accept::{Outcome, accept};
+use host_tests::accept::{Outcome, accept, wired};
 use host_tests::lesson::{Play, shipped};
 use host_tests::plc::{Plc, Recipe};
 use model_core::image::{Commands, Image};
 use model_core::machine::Machine;
+use support::{Running, winder};
 
 fn run(plc: impl Controller) -> Outcome {
     accept(&mut Lockstep::new(&Machine::news_8000(), plc).unwrap())
@@ -99,6 +107,105 @@ fn a_plc_that_stops_in_the_middle_is_found_out() {
     assert!(outcome.course.ended.is_some());
     let unseen = |id| outcome.not_seen().any(|(check, _)| check.id == id);
     assert!(unseen("F13") && !unseen("S03"));
+}
+
+/// Over Modbus, in real time, with a PLC that stops after a few seconds. The person at its desk types ahead.
+#[test]
+fn a_run_over_the_link_asks_for_the_desk_and_ends_with_its_plc() {
+    let running = Running::start(&["--board", "host"]);
+    let address = running.address;
+    let plc = StPlc::new(REFERENCE).unwrap();
+    // 6 s of cycles of 20 ms
+    let plc = thread::spawn(move || wired::run(address, Stopping { plc, left: 300 }, |_| ()));
+    let out = tempfile::tempdir().unwrap();
+    let mut accept = winder(&["accept", "--ask", &address.to_string()])
+        .arg("--out")
+        .arg(out.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = "\n".repeat(1000);
+    accept
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(lines.as_bytes())
+        .unwrap();
+    let done = accept.wait_with_output().unwrap();
+    let (said, asked) = (text(&done.stdout), text(&done.stderr));
+    assert_eq!(done.status.code(), Some(1), "{said}{asked}");
+    assert!(asked.contains("at the PLC's desk: press "), "{asked}");
+    assert!(
+        said.contains("\nL01  ") || said.starts_with("L01  "),
+        "{said}"
+    );
+    assert!(said.contains("heartbeat has stood"), "{said}");
+    for check in ["S01  ", "S03  ", "L07  "] {
+        assert!(!said.contains(check), "{check}: {said}");
+    }
+    let report = std::fs::read_to_string(out.path().join("accept.html")).unwrap();
+    assert!(report.contains("heartbeat has stood"));
+    assert_eq!(plc.join().unwrap().unwrap(), "it has been stopped");
+}
+
+/// Asked for on the page, which sees it begin and hears why it has ended. A wrong password is said to be one.
+#[test]
+fn the_page_asks_for_a_run_and_hears_what_came_of_it() {
+    let running = Running::start(&["--board", "host"]);
+    let (address, page) = (running.address, running.page.clone());
+    let agent = ureq::agent();
+    let post = |path: &str, cookie: &str, body: &str| {
+        agent
+            .post(format!("{page}/api/v1/{path}"))
+            .header("Content-Type", "application/json")
+            .header("Cookie", cookie)
+            .send(body)
+            .unwrap()
+    };
+    let password = r#"{"password":"a long password"}"#;
+    post("password", "", password);
+    let login = post("login", "", password);
+    let cookie = login.headers()["set-cookie"].to_str().unwrap().to_owned();
+    let seen = || -> serde_json::Value {
+        let mut answer = agent
+            .get(format!("{page}/api/v1/acceptance"))
+            .call()
+            .unwrap();
+        serde_json::from_str(&answer.body_mut().read_to_string().unwrap()).unwrap()
+    };
+
+    let wrong = Page::log_in(&page, "another password").err().unwrap();
+    assert!(format!("{wrong:#}").contains("401"), "{wrong:#}");
+    let runner = Page::log_in(&page, "a long password").unwrap();
+    let plc = StPlc::new(REFERENCE).unwrap();
+    let plc = thread::spawn(move || wired::run(address, Stopping { plc, left: 150 }, |_| ()));
+    let run = thread::spawn(move || runner.attend(address).unwrap());
+    post("acceptance", &cookie, r#"{"run":true}"#);
+    let (request, outcome) = run.join().unwrap();
+    assert_eq!(request, 1);
+    assert!(outcome.course.ended.is_some());
+    let told = seen();
+    assert_eq!(told["state"], "stopped", "{told}");
+    assert!(
+        told["text"]
+            .as_str()
+            .unwrap()
+            .contains("heartbeat has stood")
+    );
+    let checks = told["checks"].as_array().unwrap();
+    assert_eq!(checks.len(), outcome.verdicts.len());
+    assert!(
+        checks
+            .iter()
+            .any(|check| check["id"] == "L01" && check["state"] == "failed")
+    );
+    assert_eq!(plc.join().unwrap().unwrap(), "it has been stopped");
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// A program that winds one set by itself and has no operator.

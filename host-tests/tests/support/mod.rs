@@ -19,6 +19,8 @@ pub fn winder(arguments: &[&str]) -> Command {
 pub struct Running {
     child: Child,
     pub address: SocketAddr,
+    /// The page, `http://HOST:PORT`.
+    pub page: String,
 }
 
 impl Running {
@@ -31,11 +33,12 @@ impl Running {
         let mut line = String::new();
         out.read_line(&mut line).expect("text");
         let ready = line.trim_end().strip_prefix("ready modbus=");
-        let address = ready.and_then(|ready| ready.split_once(' '));
-        let address = address.map(|(address, _)| address);
-        let address = address.and_then(|address| address.parse().ok());
+        let ready = ready.and_then(|ready| ready.split_once(" http="));
+        let ready = ready.and_then(|(address, page)| Some((address.parse().ok()?, page)));
+        let (address, page) = ready.unwrap_or_else(|| panic!("not ready: {line:?}"));
         Self {
-            address: address.unwrap_or_else(|| panic!("not ready: {line:?}")),
+            address,
+            page: page.to_owned(),
             child,
         }
     }
