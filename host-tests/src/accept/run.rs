@@ -131,7 +131,7 @@ pub fn run(world: &mut dyn World) -> Course {
         course: Course::default(),
         beat: None,
     };
-    for (i, (name, episode)) in EPISODES.into_iter().enumerate() {
+    for (i, (name, episode)) in EPISODES.iter().enumerate() {
         let share = i as f64 / EPISODES.len() as f64;
         run.world.begins(name, share);
         let from = run.course.samples.len();
