@@ -11,6 +11,8 @@ use anyhow::{Context, Result};
 use gimli::{Dwarf, EndianArcSlice, LittleEndian, SectionId};
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind, elf};
 
+use super::frames::{Function, deepest};
+
 type Reader = EndianArcSlice<LittleEndian>;
 
 /// The symbols, sections and lines of an ELF file.
@@ -31,6 +33,8 @@ pub struct Sizes {
     pub ram: u64,
     /// Memory for the stack.
     pub stack: u64,
+    /// What the deepest calls take of it.
+    pub deepest: u64,
 }
 
 impl Elf {
@@ -67,9 +71,13 @@ impl Elf {
         let lines = Dwarf::load(load)
             .and_then(Lines::from_dwarf)
             .with_context(|| format!("cannot read the lines of {}", path.display()))?;
+        let sizes = Sizes {
+            deepest: deepest(&functions(&file)).0,
+            ..sizes(&file, stack)
+        };
         Ok(Self {
             symbols,
-            sizes: sizes(&file, stack),
+            sizes,
             stack,
             lines,
         })
@@ -112,6 +120,21 @@ impl Elf {
     pub fn stack(&self) -> (u64, u64) {
         self.stack
     }
+}
+
+/// Every function with what it takes of the stack, and whom it calls.
+fn functions(file: &object::File<'_>) -> BTreeMap<u64, Function> {
+    let mut functions = BTreeMap::new();
+    for symbol in file.symbols().filter(|s| s.kind() == SymbolKind::Text) {
+        let address = symbol.address() & !1;
+        let section = symbol.section_index().map(|i| file.section_by_index(i));
+        if let Some(Ok(section)) = section
+            && let Ok(Some(code)) = section.data_range(address, symbol.size())
+        {
+            functions.insert(address, Function::read(code, address));
+        }
+    }
+    functions
 }
 
 fn sizes(file: &object::File<'_>, stack: (u64, u64)) -> Sizes {

@@ -8,6 +8,7 @@
 
 pub mod bench;
 pub mod elf;
+pub mod frames;
 pub mod golden;
 pub mod hang;
 pub mod load;
