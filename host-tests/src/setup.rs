@@ -185,6 +185,16 @@ pub fn mbpoll() -> Result<PathBuf> {
     installed(&["mbpoll"], "mbpoll", "mbpoll")
 }
 
+/// A soft PLC of others: LinuxCNC's ladder and its Modbus client, by the program that runs them; installed with apt where
+/// they are missing.
+pub fn soft_plc() -> Result<PathBuf> {
+    installed(
+        &["linuxcnc-uspace", "halrun"],
+        "ClassicLadder and mb2hal",
+        "LinuxCNC (2.9), for uspace",
+    )
+}
+
 /// A program by any of its names; where there is none, the Debian package of the first name is installed.
 fn installed(names: &[&str], what: &str, by_hand: &str) -> Result<PathBuf> {
     let present = || names.iter().find_map(|name| on_path(name));
@@ -373,7 +383,8 @@ pub fn on_path(program: &str) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-fn is_root() -> bool {
+/// This process may do everything.
+pub fn is_root() -> bool {
     // the owner of our own entry is our effective user
     std::fs::metadata("/proc/self").is_ok_and(|own| own.uid() == 0)
 }

@@ -40,6 +40,8 @@ pub fn main() -> Result<ExitCode> {
                 "--test",
                 "qemu",
                 "--test",
+                "soft_plc",
+                "--test",
                 "twin",
                 "--test",
                 "watchdog",
@@ -61,6 +63,7 @@ pub fn main() -> Result<ExitCode> {
     setup::qemu()?;
     setup::chromium()?;
     setup::mbpoll()?;
+    setup::soft_plc()?;
     setup::target(TARGET)?;
     setup::target(TARGET_SOFT)?;
     let began = Instant::now();
