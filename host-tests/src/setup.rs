@@ -185,6 +185,11 @@ pub fn mbpoll() -> Result<PathBuf> {
     installed(&["mbpoll"], "mbpoll", "mbpoll")
 }
 
+/// What sets a network namespace up, installed with apt where it is missing.
+pub fn ip() -> Result<PathBuf> {
+    installed(&["iproute2", "ip"], "iproute2", "iproute2")
+}
+
 /// A soft PLC of others: LinuxCNC's ladder and its Modbus client, by the program that runs them; installed with apt where
 /// they are missing.
 pub fn soft_plc() -> Result<PathBuf> {

@@ -36,6 +36,16 @@ impl Board {
 /// Simulated time over real time: from slow motion to faster than any PC.
 const PACES: RangeInclusive<f64> = 0.01..=1000.0;
 
+/// How the board in QEMU is reached.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Network {
+    /// At two ports of 127.0.0.1, through QEMU's user network.
+    #[default]
+    Ports,
+    /// At its own address, by the TAP of [`crate::namespace`].
+    Tap,
+}
+
 /// How to run a simulator.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -43,6 +53,8 @@ pub struct Options {
     pub port: u16,
     /// Port of 127.0.0.1 for the HMI; 0 takes any free one.
     pub http_port: u16,
+    /// How it is reached in QEMU.
+    pub network: Network,
     /// Simulated time over real time.
     pub pace: f64,
     /// Where its log goes.
@@ -54,6 +66,7 @@ impl Default for Options {
         Self {
             port: 0,
             http_port: 0,
+            network: Network::Ports,
             pace: 1.0,
             log: Log::default(),
         }
@@ -121,6 +134,7 @@ fn host(options: Options) -> Result<board_host::Board> {
     let Options {
         port,
         http_port,
+        network: _,
         pace,
         log,
     } = options;

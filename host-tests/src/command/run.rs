@@ -49,6 +49,7 @@ fn serve(args: Args) -> Result<()> {
                 eprintln!("{line}");
             }
         }),
+        ..Options::default()
     };
     let mut simulator = Simulator::start(args.board, options)?;
     let mut out = io::stdout().lock();

@@ -36,6 +36,8 @@ pub fn main() -> Result<ExitCode> {
                 "--features",
                 "qemu",
                 "--test",
+                "network",
+                "--test",
                 "peers",
                 "--test",
                 "qemu",
@@ -64,6 +66,7 @@ pub fn main() -> Result<ExitCode> {
     setup::chromium()?;
     setup::mbpoll()?;
     setup::soft_plc()?;
+    setup::ip()?;
     setup::target(TARGET)?;
     setup::target(TARGET_SOFT)?;
     let began = Instant::now();
