@@ -98,6 +98,13 @@ impl Qemu {
         self.http
     }
 
+    /// Where the other end of its serial line is.
+    pub fn serial(&self) -> Option<String> {
+        let lines = self.log.lines();
+        let path = lines.iter().find_map(|line| line.text.strip_prefix(SERIAL));
+        path.map(str::to_owned)
+    }
+
     /// An error that says why, once QEMU has ended by itself.
     pub fn check(&mut self) -> Result<()> {
         let Some(status) = self

@@ -10,12 +10,13 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use board_host::STATION;
 use etherparse::err::packet::BuildWriteError;
 use etherparse::{
     ArpHardwareId, ArpOperation, ArpPacket, EtherType, IpFragOffset, IpHeaders, IpNumber,
     Ipv4Extensions, Ipv4Header, PacketBuilder, PacketBuilderStep,
 };
-use host_tests::conformance::{self, Map, Outcome, Server};
+use host_tests::conformance::{self, Map, Outcome, Server, serial};
 use host_tests::link::Link;
 use host_tests::log::Log;
 use host_tests::namespace::{self, GUEST, Side, TAP};
@@ -84,7 +85,9 @@ fn the_board_in_qemu_passes_every_conformance_case() {
         address: simulator.address(),
         map: Map::default(),
     };
-    let outcomes = conformance::run(server, |_| ());
+    let mut outcomes = conformance::run(server, |_| ());
+    let line = simulator.serial().expect("a pseudoterminal");
+    serial::run(&line, 19_200, STATION, &server.map, |o| outcomes.push(o)).unwrap();
     let passed = |o: &Outcome| o.failed.is_none() || excused.contains(&o.id);
     let table = conformance::table(&outcomes);
     assert!(outcomes.iter().all(passed), "\n{table}{}", log.last(20));

@@ -65,6 +65,7 @@ pub fn main() -> Result<ExitCode> {
     setup::qemu()?;
     setup::chromium()?;
     setup::mbpoll()?;
+    setup::pymodbus()?;
     setup::soft_plc()?;
     setup::ip()?;
     setup::target(TARGET)?;
