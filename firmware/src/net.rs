@@ -1,8 +1,12 @@
 //! What boards with embassy's network stack share: where the address comes from, the Modbus server, the HMI's.
 //!
 //! Not here: the network device, and the stack that a board builds around it; what is said on a connection, which is
-//! the link's session and the HMI's. There is no IPv6 and no queue of connections: with every socket busy the next
-//! client is refused.
+//! the link's session and the HMI's. There is no IPv6.
+
+use core::future::poll_fn;
+use core::mem;
+use core::pin::{Pin, pin};
+use core::task::Poll;
 
 use embassy_futures::join::join;
 use embassy_net::driver::Driver;
@@ -24,11 +28,15 @@ use crate::store::Network;
 const MODBUS_PORT: u16 = 502;
 /// Clients that can be served at once.
 pub const MODBUS_CLIENTS: usize = 8;
-/// One more listens, and gives the newcomer somebody's place when all are taken.
-pub const MODBUS_SOCKETS: usize = MODBUS_CLIENTS + 1;
-/// More than two of the longest Modbus frames (260 bytes), in each direction. Small enough that all sockets together
-/// fit into a network device's receive FIFO of 10 KiB, so that clients alone cannot overrun it.
-const BUFFER_BYTES: usize = 768;
+/// Some more listen, and give newcomers somebody's place when all are taken. The stack keeps no queue of connections: one
+/// that comes while none of its sockets listens is refused. A socket that loses its client listens again a moment
+/// later, and until then the others do.
+const MODBUS_SPARE: usize = 3;
+/// Sockets, and so tasks, of the Modbus server.
+pub const MODBUS_SOCKETS: usize = MODBUS_CLIENTS + MODBUS_SPARE;
+/// Two of the longest Modbus frames (260 bytes), in each direction. Small enough that all sockets together fit into a
+/// network device's receive FIFO of 10 KiB, so that clients alone cannot overrun it.
+const BUFFER_BYTES: usize = 600;
 
 /// HTTP, from the IANA registry.
 const HTTP_PORT: u16 = 80;
@@ -42,6 +50,9 @@ const HTTP_TX_BYTES: usize = 2 * 1460;
 const KEEP_ALIVE: Duration = Duration::from_secs(5);
 /// … and is given up when nothing came from it for this long.
 const TIMEOUT: Duration = Duration::from_secs(15);
+/// A handshake takes a network's round trip. One that its client has not ended by then is given up: a flood of them
+/// takes every socket, and must not keep them.
+const HANDSHAKE: Duration = Duration::from_millis(500);
 /// The time for the last bytes of a connection to get through.
 const CLOSING: Duration = Duration::from_secs(2);
 /// A DHCP server that has not answered by then is not there.
@@ -49,6 +60,29 @@ const DHCP: Duration = Duration::from_secs(10);
 
 /// The places of the Modbus clients.
 pub type Places<M> = Seats<M, MODBUS_CLIENTS>;
+
+/// Waits for a client whose handshake ends; false, when one does not. Such a socket has to be dropped and not closed:
+/// nobody is there to be told, and it would wait for the address of nobody's hardware.
+async fn accept(socket: &mut TcpSocket<'_>, port: u16) -> bool {
+    let ended = {
+        let mut accepted = pin!(socket.accept(port));
+        let mut listens = false;
+        let mut handshake = None;
+        poll_fn(|cx| {
+            if let Poll::Ready(accepted) = accepted.as_mut().poll(cx) {
+                return Poll::Ready(accepted.is_ok());
+            }
+            // the first time it begins to listen; again, when a handshake begins
+            if !mem::replace(&mut listens, true) {
+                return Poll::Pending;
+            }
+            let handshake = handshake.get_or_insert_with(|| Timer::after(HANDSHAKE));
+            Pin::new(handshake).poll(cx).map(|()| false)
+        })
+        .await
+    };
+    ended && socket.remote_endpoint().is_some()
+}
 
 /// One client after the other: the task of one socket, of which a board runs [`MODBUS_SOCKETS`].
 pub async fn serve_modbus<M: RawMutex>(
@@ -59,27 +93,28 @@ pub async fn serve_modbus<M: RawMutex>(
     let mut rx = [0; BUFFER_BYTES];
     let mut tx = [0; BUFFER_BYTES];
     let timeouts = Timeouts::default();
-    let mut socket = TcpSocket::new(stack, &mut rx, &mut tx);
-    socket.set_keep_alive(Some(KEEP_ALIVE));
-    socket.set_timeout(Some(TIMEOUT));
-    // An answer is one write: holding it back for more would only delay it.
-    socket.set_nagle_enabled(false);
     loop {
-        if socket.accept(MODBUS_PORT).await.is_ok() {
-            let peer = socket.remote_endpoint().map(|from| match from.addr {
-                IpAddress::Ipv4(address) => Peer::Ip(address),
-            });
-            let client = peer.and_then(|peer| service.enter(peer, Protocol::ModbusTcp));
-            if let Some(client) = client {
-                let place = places.take();
-                let talk = session(&mut socket, &client, &timeouts, || place.answered());
-                if place.hold(talk).await == Some(End::Closed) {
-                    socket.close();
-                    let _ = with_timeout(CLOSING, socket.flush()).await;
-                }
+        let mut socket = TcpSocket::new(stack, &mut rx, &mut tx);
+        socket.set_keep_alive(Some(KEEP_ALIVE));
+        socket.set_timeout(Some(TIMEOUT));
+        // An answer is one write: holding it back for more would only delay it.
+        socket.set_nagle_enabled(false);
+        if !accept(&mut socket, MODBUS_PORT).await {
+            continue;
+        }
+        let peer = socket.remote_endpoint().map(|from| match from.addr {
+            IpAddress::Ipv4(address) => Peer::Ip(address),
+        });
+        let client = peer.and_then(|peer| service.enter(peer, Protocol::ModbusTcp));
+        if let Some(client) = client {
+            let place = places.take();
+            let talk = session(&mut socket, &client, &timeouts, || place.answered());
+            if place.hold(talk).await == Some(End::Closed) {
+                socket.close();
+                let _ = with_timeout(CLOSING, socket.flush()).await;
             }
         }
-        // Whatever state it is in: the socket must be closed to listen again.
+        // Whatever state it is in: a client that is there is told.
         socket.abort();
         let _ = with_timeout(CLOSING, socket.flush()).await;
     }
@@ -123,7 +158,7 @@ pub async fn serve_http<M: RawMutex, const N: usize>(
         socket.set_timeout(Some(TIMEOUT));
         // A sample is one write: holding it back for more would only delay it.
         socket.set_nagle_enabled(false);
-        if socket.accept(HTTP_PORT).await.is_ok() {
+        if accept(&mut socket, HTTP_PORT).await {
             let place = places.take();
             let session = hmi::serve(socket, http, hmi, || place.answered());
             // Displaced, the connection ends with the session.

@@ -16,6 +16,7 @@ pub mod lesson;
 pub mod link;
 pub mod log;
 pub mod machine_file;
+pub mod namespace;
 pub mod plant;
 pub mod plc;
 pub mod plot;

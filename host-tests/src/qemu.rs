@@ -19,13 +19,19 @@ use defmt_decoder::{DecodeError, Frame, Table};
 use crate::interrupt;
 use crate::link::Link;
 use crate::log::{Level, Line, Log};
+use crate::namespace;
 use crate::setup::{Mps2, on_path};
-use crate::simulator::Options;
+use crate::simulator::{Network, Options};
 
 /// Time from power-up to the first answer: a second or so, more on a busy PC.
 const START_TIMEOUT: Duration = Duration::from_secs(60);
 /// Lines of the log that an error shows.
 const LAST_WORDS: usize = 5;
+
+/// Where the guest serves Modbus TCP, …
+const MODBUS: u16 = 502;
+/// … and its HMI.
+const HTTP: u16 = 80;
 
 /// What the log says before the path of the serial line.
 pub const SERIAL: &str = "Modbus RTU, station 1, at ";
@@ -43,15 +49,25 @@ pub struct Qemu {
 impl Qemu {
     /// Starts the simulator and waits until it answers.
     pub fn start(files: &Mps2, options: Options) -> Result<Self> {
-        let port = free_port(options.port, "--port")?;
-        let http_port = free_port(options.http_port, "--http-port")?;
+        let (network, address, http) = match options.network {
+            Network::Ports => {
+                let port = free_port(options.port, "--port")?;
+                let http_port = free_port(options.http_port, "--http-port")?;
+                let at = |port| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+                (ports(port, http_port), at(port), at(http_port))
+            }
+            Network::Tap => {
+                let at = |port| SocketAddr::from((namespace::GUEST, port));
+                (tap(), at(MODBUS), at(HTTP))
+            }
+        };
         let elf = fs::read(&files.firmware)
             .with_context(|| format!("cannot read the firmware {}", files.firmware.display()))?;
         let table = Table::parse(&elf)
             .context("cannot read the log's texts in the firmware")?
             .context("the firmware has no log: its ELF file lacks the defmt section")?;
 
-        let command = command(files, port, http_port, options.pace);
+        let command = command(files, &network, options.pace);
         let (started, child) = mpsc::channel();
         let log = options.log.clone();
         let keeper = thread::spawn(move || keep(command, &started, &table, &log));
@@ -63,8 +79,8 @@ impl Qemu {
         }
         let mut qemu = Self {
             child,
-            address: SocketAddr::from((Ipv4Addr::LOCALHOST, port)),
-            http: SocketAddr::from((Ipv4Addr::LOCALHOST, http_port)),
+            address,
+            http,
             log: options.log,
             readers,
         };
@@ -80,6 +96,13 @@ impl Qemu {
     /// Where its HMI is.
     pub fn http(&self) -> SocketAddr {
         self.http
+    }
+
+    /// Where the other end of its serial line is.
+    pub fn serial(&self) -> Option<String> {
+        let lines = self.log.lines();
+        let path = lines.iter().find_map(|line| line.text.strip_prefix(SERIAL));
+        path.map(str::to_owned)
     }
 
     /// An error that says why, once QEMU has ended by itself.
@@ -137,7 +160,19 @@ fn free_port(wanted: u16, option: &str) -> Result<u16> {
     Ok(listener.local_addr()?.port())
 }
 
-fn command(files: &Mps2, port: u16, http_port: u16, pace: f64) -> Command {
+/// QEMU's user network, which forwards two ports and lets nothing out.
+fn ports(port: u16, http_port: u16) -> String {
+    let forward = |from, to| format!("hostfwd=tcp:127.0.0.1:{from}-:{to}");
+    let (modbus, http) = (forward(port, MODBUS), forward(http_port, HTTP));
+    format!("user,restrict=on,{modbus},{http}")
+}
+
+/// The TAP of [`namespace`].
+fn tap() -> String {
+    format!("tap,ifname={},script=no,downscript=no", namespace::TAP)
+}
+
+fn command(files: &Mps2, network: &str, pace: f64) -> Command {
     // where setpriv is at hand QEMU ends with us however we end, even by SIGKILL
     let mut command = match on_path("setpriv") {
         Some(setpriv) => {
@@ -161,10 +196,7 @@ fn command(files: &Mps2, port: u16, http_port: u16, pace: f64) -> Command {
         ])
         // the second UART: Modbus RTU at a pseudoterminal, whose name QEMU tells first
         .args(["-chardev", "pty,id=rtu", "-serial", "chardev:rtu"])
-        .arg("-nic")
-        .arg(format!(
-            "user,restrict=on,hostfwd=tcp:127.0.0.1:{port}-:502,hostfwd=tcp:127.0.0.1:{http_port}-:80"
-        ))
+        .args(["-nic", network])
         .arg("-kernel")
         .arg(&files.firmware)
         .stdin(Stdio::null())

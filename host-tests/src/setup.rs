@@ -185,6 +185,59 @@ pub fn mbpoll() -> Result<PathBuf> {
     installed(&["mbpoll"], "mbpoll", "mbpoll")
 }
 
+/// What sets a network namespace up, installed with apt where it is missing.
+pub fn ip() -> Result<PathBuf> {
+    installed(&["iproute2", "ip"], "iproute2", "iproute2")
+}
+
+/// A soft PLC of others: LinuxCNC's ladder and its Modbus client, by the program that runs them; installed with apt where
+/// they are missing.
+pub fn soft_plc() -> Result<PathBuf> {
+    installed(
+        &["linuxcnc-uspace", "halrun"],
+        "ClassicLadder and mb2hal",
+        "LinuxCNC (2.9), for uspace",
+    )
+}
+
+/// Python, for what runs in it.
+pub fn python() -> Result<PathBuf> {
+    installed(&["python3"], "Python", "Python (3.10 or later)")
+}
+
+/// The version of pymodbus that the tests know.
+const PYMODBUS: &str = "pymodbus==3.16.1";
+
+/// A Python that has pymodbus: an environment of its own, made where it is missing.
+pub fn pymodbus() -> Result<PathBuf> {
+    let environment = scratch("pymodbus")?;
+    let python = environment.join("bin").join("python");
+    let has = || {
+        let mut import = Command::new(&python);
+        import.args(["-c", "import pymodbus"]).stderr(Stdio::null());
+        python.is_file() && succeeds(&mut import)
+    };
+    if has() {
+        return Ok(python);
+    }
+    let make = || {
+        let mut make = Command::new(self::python()?);
+        run(make.args(["-m", "venv", "--clear"]).arg(&environment))
+    };
+    step("installing pymodbus (pip)");
+    // Debian has what it takes in a package of its own
+    if make().is_err() {
+        debian("python3-venv", "Python's environments", "Python's venv")?;
+        make()?;
+    }
+    run(Command::new(&python).args(["-m", "pip", "install", "--quiet", PYMODBUS]))?;
+    ensure!(
+        has(),
+        "pip has installed {PYMODBUS}, but it cannot be imported"
+    );
+    Ok(python)
+}
+
 /// A program by any of its names; where there is none, the Debian package of the first name is installed.
 fn installed(names: &[&str], what: &str, by_hand: &str) -> Result<PathBuf> {
     let present = || names.iter().find_map(|name| on_path(name));
@@ -192,6 +245,12 @@ fn installed(names: &[&str], what: &str, by_hand: &str) -> Result<PathBuf> {
         return Ok(path);
     }
     let package = names[0];
+    debian(package, what, by_hand)?;
+    present().with_context(|| format!("apt-get has installed {package}, but it is not on the PATH"))
+}
+
+/// Installs a Debian package.
+fn debian(package: &str, what: &str, by_hand: &str) -> Result<()> {
     let install = ["install", "-y", "--no-install-recommends", package];
     ensure!(
         on_path("apt-get").is_some(),
@@ -225,8 +284,7 @@ fn installed(names: &[&str], what: &str, by_hand: &str) -> Result<PathBuf> {
     if let Err(error) = apt_get(&["update"]) {
         eprintln!("winder: {error:#}; trying to install all the same");
     }
-    apt_get(&install)?;
-    present().with_context(|| format!("apt-get has installed {package}, but it is not on the PATH"))
+    apt_get(&install)
 }
 
 /// A Rust target of the microcontrollers, installed with rustup where it is missing.
@@ -373,7 +431,8 @@ pub fn on_path(program: &str) -> Option<PathBuf> {
         .find(|path| path.is_file())
 }
 
-fn is_root() -> bool {
+/// This process may do everything.
+pub fn is_root() -> bool {
     // the owner of our own entry is our effective user
     std::fs::metadata("/proc/self").is_ok_and(|own| own.uid() == 0)
 }

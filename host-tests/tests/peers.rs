@@ -1,13 +1,15 @@
 //! Modbus clients that are not ours, against the firmware in QEMU: mbpoll (libmodbus) over TCP and over the serial
-//! line, and pymodbus. `cargo winder test` installs mbpoll and runs it; pymodbus is asked only where it is installed.
+//! line, pymodbus, and tokio-modbus. `cargo winder test` installs what is missing of them.
 
-use std::path::Path;
+use std::net::SocketAddr;
 use std::process::Command;
 
 use host_tests::log::Log;
 use host_tests::qemu::SERIAL;
-use host_tests::setup::on_path;
+use host_tests::setup;
 use host_tests::simulator::{Board, Options, Simulator};
+use tokio_modbus::ExceptionCode;
+use tokio_modbus::client::sync::{self, Reader as _, Writer as _};
 
 /// The simulator in QEMU, and the path of its serial line.
 fn simulator() -> (Simulator, String) {
@@ -51,21 +53,12 @@ fn peers_read_what_they_have_written() {
     ];
     let read = mbpoll(&[&rtu[..], &["-c", "2"]].concat(), &[&line]);
     assert!(read.contains("1234"), "{read}");
-    let python = on_path("python3");
-    let has = python.filter(|python| {
-        let import = Command::new(python)
-            .args(["-c", "import pymodbus"])
-            .status();
-        import.is_ok_and(|status| status.success())
-    });
-    match has {
-        Some(python) => pymodbus(&python, &ip, &port),
-        None => eprintln!("no pymodbus: not tried"),
-    }
+    pymodbus(&ip, &port);
+    tokio_modbus(address);
 }
 
 /// Every function that it has, on words, bits and floats.
-fn pymodbus(python: &Path, ip: &str, port: &str) {
+fn pymodbus(ip: &str, port: &str) {
     const SCRIPT: &str = r#"
 import sys
 from pymodbus.client import ModbusTcpClient as Client
@@ -86,5 +79,28 @@ assert good(plc.read_holding_registers(6, count=1)).registers == [12345]
 assert good(plc.read_device_information()).information[0]
 assert plc.read_holding_registers(500, count=1).exception_code == 2
 "#;
+    let python = setup::pymodbus().expect("pymodbus");
     said(Command::new(python).args(["-c", SCRIPT, ip, port]));
+}
+
+/// Likewise.
+fn tokio_modbus(address: SocketAddr) {
+    let mut plc = sync::tcp::connect(address).expect("it connects");
+    let words = [1234, 123];
+    plc.write_multiple_registers(16, &words).unwrap().unwrap();
+    assert_eq!(plc.read_holding_registers(16, 2).unwrap().unwrap(), words);
+    plc.write_single_register(17, 124).unwrap().unwrap();
+    plc.write_single_coil(16 * 17, true).unwrap().unwrap();
+    plc.write_multiple_coils(16 * 17, &[false; 3])
+        .unwrap()
+        .unwrap();
+    let bits = plc.read_coils(16 * 17, 3).unwrap().unwrap();
+    assert_eq!(bits, [false; 3]);
+    assert_eq!(plc.read_discrete_inputs(0, 40).unwrap().unwrap().len(), 40);
+    assert_eq!(plc.read_input_registers(0, 65).unwrap().unwrap().len(), 65);
+    plc.masked_write_register(17, 0, 150).unwrap().unwrap();
+    let exchanged = plc.read_write_multiple_registers(16, 2, 16, &[1000]);
+    assert_eq!(exchanged.unwrap().unwrap(), [1000, 150]);
+    let refused = plc.read_holding_registers(500, 1).unwrap();
+    assert_eq!(refused, Err(ExceptionCode::IllegalDataAddress));
 }

@@ -261,8 +261,8 @@ impl Default for Control {
 }
 
 impl Control {
-    /// Clients at once, of all links together: eight of Modbus TCP, one that is just coming, the serial line.
-    pub const CLIENTS: usize = 10;
+    /// Clients at once, of all links together: eight of Modbus TCP, three that are just coming, the serial line.
+    pub const CLIENTS: usize = 12;
     /// A PLC that has not written for this long no longer controls the winder. Longer than it takes to reconnect.
     pub const HOLD: Duration = Duration::from_secs(5);
 

@@ -31,6 +31,12 @@ pub struct Args {
     /// Numbers to compute with: f32, f64 or fixed; may be given several times [default: all]
     #[arg(long = "scalar", value_name = "NAME", value_parser = scalar)]
     scalars: Vec<&'static Scalar>,
+    /// Measure the link instead: requests of Modbus TCP, on both boards
+    #[arg(long, conflicts_with_all = ["machines", "scalars"])]
+    link: bool,
+    /// With --link, a thousand connections a second for a minute too
+    #[arg(long, requires = "link")]
+    connects: bool,
 }
 
 type Floors = BTreeMap<&'static str, Floor>;
@@ -92,6 +98,9 @@ const PARTS: [(&str, &str); 8] = [
 
 /// Measures and prints what can be; says what cannot.
 pub fn main(args: &Args) -> Result<ExitCode> {
+    if args.link {
+        return super::link_bench::main(args.connects);
+    }
     let names: Vec<&str> = match &args.machines[..] {
         [] => MACHINES.to_vec(),
         names => names.iter().map(String::as_str).collect(),

@@ -8,6 +8,7 @@ pub mod figures;
 pub mod flash;
 pub mod fuzz;
 pub mod lesson;
+mod link_bench;
 pub mod machine;
 pub mod plc;
 pub mod replay;

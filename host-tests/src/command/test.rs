@@ -36,9 +36,13 @@ pub fn main() -> Result<ExitCode> {
                 "--features",
                 "qemu",
                 "--test",
+                "network",
+                "--test",
                 "peers",
                 "--test",
                 "qemu",
+                "--test",
+                "soft_plc",
                 "--test",
                 "twin",
                 "--test",
@@ -61,6 +65,9 @@ pub fn main() -> Result<ExitCode> {
     setup::qemu()?;
     setup::chromium()?;
     setup::mbpoll()?;
+    setup::pymodbus()?;
+    setup::soft_plc()?;
+    setup::ip()?;
     setup::target(TARGET)?;
     setup::target(TARGET_SOFT)?;
     let began = Instant::now();

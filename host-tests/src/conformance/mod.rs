@@ -1,4 +1,4 @@
-//! Does a Modbus TCP server do what the specification wants? A table of cases, for any server.
+//! Does a Modbus server do what the specification wants? A table of cases, for any server.
 //!
 //! Not here: what the registers mean, idle times of a minute, and what needs raw packets (half-open connections,
 //! floods). A case writes only to the registers of [`Map::scratch`], and what it finds there it puts back.
@@ -7,11 +7,15 @@
 //! |---|---|
 //! | [`pdu`] | one request and the reply to it |
 //! | [`stream`] | frames on a connection, and connections |
+//! | [`serial`] | the same PDU, and frames, on a serial line |
+//! | [`peers`] | servers of others, to compare |
 //!
 //! Sources, as the cases cite them: PDU is the MODBUS Application Protocol Specification V1.1b3, TCP the MODBUS
 //! Messaging on TCP/IP Implementation Guide V1.0b.
 
 pub mod pdu;
+pub mod peers;
+pub mod serial;
 pub mod stream;
 
 use std::fmt;

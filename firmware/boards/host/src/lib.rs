@@ -3,8 +3,10 @@
 //! Not here: priorities, since the simulator runs in lockstep, see [`Board::simulate`]; hard real time, since a thread of an
 //! ordinary process is late now and then, though no step is ever lost; addresses other than loopback.
 
+mod access;
 mod flash;
 mod http;
+mod serial;
 
 use std::cell::RefCell;
 use std::io;
@@ -29,12 +31,15 @@ use firmware::lockstep::Lockstep;
 use firmware::store::{Keeper, Store};
 use model_core::image::{Commands, Feedback, Image};
 use model_core::machine::Machine;
+use serial::Port;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 use tokio::task::LocalSet;
 
+pub use access::{Rule, access};
 pub use flash::Flash;
 pub use http::{CONNECTIONS, Desk};
+pub use serial::{Line, STATION};
 
 /// Period of [`Board::start`]'s `step`: the drive cycle.
 pub const STEP: Duration = Duration::from_millis(10);
@@ -67,6 +72,8 @@ pub struct Options {
     pub port: u16,
     /// The HMI's port on loopback; 0 for any that is free.
     pub http_port: u16,
+    /// The serial line of Modbus RTU, if there is to be one.
+    pub serial: Option<Line>,
     /// How long a client may keep a place without using it.
     pub timeouts: Timeouts,
     /// Which client may do what.
@@ -84,6 +91,7 @@ impl Default for Options {
         Self {
             port: 0,
             http_port: 0,
+            serial: None,
             timeouts: Timeouts::default(),
             access: Access::default(),
             image: Image {
@@ -102,6 +110,8 @@ pub struct Board {
     pub address: SocketAddr,
     /// Where the HMI is served.
     pub http: SocketAddr,
+    /// Where the other end of the serial line is.
+    pub serial: Option<String>,
     /// What the clients see.
     pub image: Arc<ImageCell>,
     /// Who controls the winder, and who is connected.
@@ -182,13 +192,15 @@ impl Board {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()?;
-        let (listener, http_listener) = {
+        let (listener, http_listener, port) = {
             let _context = runtime.enter();
             (
                 TcpListener::from_std(listener)?,
                 TcpListener::from_std(http_listener)?,
+                options.serial.as_ref().map(Port::open).transpose()?,
             )
         };
+        let serial = port.as_ref().map(|port| port.path.clone());
         let server = Arc::new(Server {
             listener,
             image: image.clone(),
@@ -199,6 +211,9 @@ impl Board {
         // One more than there are seats, for the client that displaces another.
         for _ in 0..=CLIENTS {
             runtime.spawn(server.clone().serve());
+        }
+        if let Some(port) = port {
+            runtime.spawn(port.serve(server.clone()));
         }
         let (stop_links, stopped) = oneshot::channel();
         let links = thread::Builder::new().name("links".into()).spawn({
@@ -227,6 +242,7 @@ impl Board {
         Ok(Self {
             address,
             http,
+            serial,
             image,
             control,
             running: Some(Running {
