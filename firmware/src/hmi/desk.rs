@@ -130,7 +130,9 @@ impl<M: RawMutex> Desk<M> {
     /// The desk of a board at power-up, with the settings that it keeps.
     pub fn keeping(board: Board, keeper: Keeper) -> Self {
         let machine = &keeper.settings().machine;
+        // What is computed is so before the desk is laid out, which then need not be moved to its place.
         let setup = Setup::new(machine);
+        let gains = Known::new(machine);
         let mut events = Events::default();
         if let Some(why) = keeper.unusable() {
             events.add(0, "settings", format_args!("defaults: {why}"));
@@ -148,7 +150,7 @@ impl<M: RawMutex> Desk<M> {
                 recorder: Recorder::new(Commands::of(machine)),
                 panel: Panel::new(machine),
                 timed: Timed::default(),
-                gains: Known::new(machine),
+                gains,
                 acceptance: Acceptance::default(),
                 keeper,
                 snapshot: None,

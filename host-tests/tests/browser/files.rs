@@ -56,8 +56,13 @@ fn a_trigger_holds_what_was_before_it() {
     bench.page.fill("Level", &LEVEL.to_string());
     bench.page.fill("History before", "3");
     bench.page.press("Arm");
-    let run = json!({"action": "run", "v_set_m_min": 200});
-    ask(&mut bench, "POST", "panel", &run);
+    // it waits while somebody sees to the winder
+    bench.show("machine");
+    bench.run(200, 400);
+    bench.until("it is at speed", |feedback| {
+        feedback.get::<f64>(&image::V_WEB) > 190.0
+    });
+    bench.show("trends");
     bench.page.until_text("Fired; arm again");
     bench.page.press("CSV");
     let csv = bench.page.download("trends.csv");
@@ -168,7 +173,6 @@ fn a_fault_for_a_time_counts_down_and_goes() {
         .until("document.querySelector('.put.in em') !== null");
     // another page, and even none, makes no difference
     bench.show("machine");
-    bench.until("it is out", |_| true);
     bench.show("faults");
     bench.page.until_text("The machine is sound.");
     assert_eq!(bench.commands().word(&image::FAULT_SENSORS), 0);
@@ -226,7 +230,9 @@ fn an_acceptance_run_is_asked_for_and_shown() {
     bench.show("acceptance");
     bench.page.press("Ask for a run");
     bench.page.until_text("No runner is connected.");
-    bench.page.until_text("cargo winder accept --attend");
+    bench
+        .page
+        .until_text("cargo winder accept --attend http://");
     let report = json!({"runner": "a script", "request": 1, "state": "running", "share": 0.5, "text": "thread",
         "checks": [{"id": "L01", "state": "passed"}, {"id": "T02", "state": "failed", "text": "no tension within 30 s"}]});
     ask(&mut bench, "POST", "acceptance/report", &report);

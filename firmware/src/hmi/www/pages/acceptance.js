@@ -48,8 +48,9 @@ export default function Acceptance() {
         : html`<button type="button" class="main" onClick=${() => ask(true)}>Ask for a run</button>`}</div>
     <div class="stack">
       ${late
-        ? html`<p class="card active some" role="status"><b>No runner is connected.</b> On a PC that reaches this address,
-          start <code>cargo winder accept --attend ${location.host}</code></p>`
+        ? html`<p class="card active some" role="status"><b>No runner is connected.</b> On a PC that reaches this address, start
+          <code>WINDER_PASSWORD=… cargo winder accept --attend http://${location.host} ${location.hostname}:PORT</code>, with
+          this page's password and the simulator's port of Modbus TCP: 502 on a board.</p>`
         : null}
       <section class="card accept"><h2>${run.request ? `Run ${run.request}` : 'Does your PLC do what a winder needs?'}</h2>
         <p role="status">${STATES[state] ?? state}${run.text ? html` <b>${run.text}</b>` : null}</p>

@@ -3,7 +3,7 @@
  *
  * Not here: the history, which `live.js` keeps whether this page is open or not. Drawing is uPlot's.
  */
-import { html, useEffect, useRef, useState } from '../vendor/ui.js';
+import { html, signal, useEffect, useRef, useState } from '../vendor/ui.js';
 import uPlot from '../vendor/uplot.js';
 import { note, save } from '../api.js';
 import { signals, history, listeners, scaled, value, digits, figure, want, cycle, CYCLE_S } from '../live.js';
@@ -33,6 +33,51 @@ const RATE = 12;
 
 /** What the page keeps while another one is shown. */
 const kept = { pens: PRESETS[4][2], window: 60, trigger: { name: 'tension', edge: 'falls', level: '70', before: '5' } };
+
+/** The trigger, which waits whether this page is shown or not: `off`, `armed` or `fired`. */
+const armed = signal('off');
+/** The end of the window that it holds, s. */
+let held = null;
+let disarm = () => {};
+
+/** Looks at every row that comes; when the trigger fires, the rest of the window still fills. */
+function arm(trigger, seconds) {
+  disarm();
+  held = null;
+  let before = null;
+  let fired = null;
+  const about = signals.value.get(trigger.name);
+  const level = Number(trigger.level);
+  const ahead = Math.min(Number(trigger.before) || 0, seconds);
+  const stop = want([trigger.name]);
+  const look = (at) => {
+    if (fired !== null) {
+      if (at * CYCLE_S < fired + seconds - ahead) return;
+      held = fired + seconds - ahead;
+      disarm();
+      armed.value = 'fired';
+      return;
+    }
+    const [, column] = history.rows([trigger.name], at, at);
+    if (!column.length || column[0] === null) return;
+    const v = scaled(about, column[0]);
+    if (before !== null && (trigger.edge === 'rises' ? before < level && v >= level : before > level && v <= level)) {
+      fired = at * CYCLE_S;
+      note(
+        `Trigger: ${trigger.name} ${trigger.edge === 'rises' ? 'rose above' : 'fell below'} ${trigger.level} ${about.unit} at ${fired.toFixed(2)} s`,
+      );
+    }
+    before = v;
+  };
+  disarm = () => {
+    listeners.delete(look);
+    stop();
+    armed.value = 'off';
+    disarm = () => {};
+  };
+  listeners.add(look);
+  armed.value = 'armed';
+}
 
 /** The colour that a custom property stands for. */
 function resolved(name) {
@@ -154,16 +199,15 @@ function room(low, high, unit) {
 export default function Trends() {
   const [pens, setPens] = useState(kept.pens);
   const [seconds, setSeconds] = useState(kept.window);
-  const [paused, setPaused] = useState(false);
+  const [paused, setPaused] = useState(held !== null);
   const [zoomed, setZoomed] = useState(false);
   const [cursor, setCursor] = useState(null);
   const [adding, setAdding] = useState('');
   const [trigger, setTrigger] = useState(kept.trigger);
-  const [armed, setArmed] = useState('off');
   const [theme, setTheme] = useState(document.documentElement.dataset.theme);
   const box = useRef();
   const plot = useRef();
-  const view = useRef({ frozen: null, zoom: null });
+  const view = useRef({ frozen: held, zoom: null });
   Object.assign(kept, { pens, window: seconds, trigger });
 
   useEffect(() => want(pens), [pens.join()]);
@@ -230,6 +274,7 @@ export default function Trends() {
   useEffect(() => {
     view.current.frozen = paused ? (view.current.frozen ?? cycle.peek() * CYCLE_S) : null;
     if (!paused) {
+      held = null;
       view.current.zoom = null;
       setZoomed(false);
     }
@@ -248,37 +293,11 @@ export default function Trends() {
     return () => listeners.delete(one);
   }, [pens.join(), seconds]);
 
-  // the trigger looks at every row that comes; when it fires, the rest of the window still fills
   useEffect(() => {
-    if (armed !== 'armed') return undefined;
-    let before = null;
-    let fired = null;
-    const about = signals.value.get(trigger.name);
-    const level = Number(trigger.level);
-    const ahead = Math.min(Number(trigger.before) || 0, seconds);
-    const stop = want([trigger.name]);
-    const look = (at) => {
-      if (fired !== null) {
-        if (at * CYCLE_S < fired + seconds - ahead) return;
-        view.current.frozen = fired + seconds - ahead;
-        setArmed('fired');
-        setPaused(true);
-        return;
-      }
-      const [, column] = history.rows([trigger.name], at, at);
-      if (!column.length || column[0] === null) return;
-      const v = scaled(about, column[0]);
-      if (before !== null && (trigger.edge === 'rises' ? before < level && v >= level : before > level && v <= level)) {
-        fired = at * CYCLE_S;
-        note(
-          `Trigger: ${trigger.name} ${trigger.edge === 'rises' ? 'rose above' : 'fell below'} ${trigger.level} ${about.unit} at ${fired.toFixed(2)} s`,
-        );
-      }
-      before = v;
-    };
-    listeners.add(look);
-    return () => (listeners.delete(look), stop());
-  }, [armed]);
+    if (armed.value !== 'fired' || held === null) return;
+    view.current.frozen = held;
+    setPaused(true);
+  }, [armed.value]);
 
   const all = [...signals.value.values()].filter((s) => s.direction === 'feedback');
   const colours = COLOURS[dark() ? 'dark' : 'light'];
@@ -358,23 +377,23 @@ export default function Trends() {
                 ${s.name}${s.unit ? ` [${s.unit}]` : ''}</option>`)}</select>`}<//>
         <h2>Trigger</h2>
         <div class="trigger">
-          <${Field} label="Signal">${(a) => html`<select ...${a} value=${trigger.name} disabled=${armed === 'armed'}
+          <${Field} label="Signal">${(a) => html`<select ...${a} value=${trigger.name} disabled=${armed.value === 'armed'}
             onChange=${(e) => setTrigger({ ...trigger, name: e.target.value })}>
               ${all.map((s) => html`<option key=${s.name}>${s.name}</option>`)}</select>`}<//>
-          <${Field} label="Edge">${(a) => html`<select ...${a} value=${trigger.edge} disabled=${armed === 'armed'}
+          <${Field} label="Edge">${(a) => html`<select ...${a} value=${trigger.edge} disabled=${armed.value === 'armed'}
             onChange=${(e) => setTrigger({ ...trigger, edge: e.target.value })}>
               <option value="rises">rises above</option><option value="falls">falls below</option></select>`}<//>
           <${Field} label="Level" unit=${signals.value.get(trigger.name)?.unit}>
-            ${(a) => html`<input ...${a} type="number" step="any" value=${trigger.level} disabled=${armed === 'armed'}
+            ${(a) => html`<input ...${a} type="number" step="any" value=${trigger.level} disabled=${armed.value === 'armed'}
               onInput=${(e) => setTrigger({ ...trigger, level: e.target.value })} />`}<//>
           <${Field} label="History before" unit="s">
             ${(a) => html`<input ...${a} type="number" min="0" max=${seconds} value=${trigger.before}
-              disabled=${armed === 'armed'} onInput=${(e) => setTrigger({ ...trigger, before: e.target.value })} />`}
+              disabled=${armed.value === 'armed'} onInput=${(e) => setTrigger({ ...trigger, before: e.target.value })} />`}
                 <//>
         </div>
-        <button type="button" class=${armed === 'armed' ? 'main' : ''}
-          onClick=${() => (armed === 'armed' ? setArmed('off') : (setPaused(false), setArmed('armed')))}>
-            ${armed === 'armed' ? 'Armed: waiting; disarm' : armed === 'fired' ? 'Fired; arm again' : 'Arm'}</button>
+        <button type="button" class=${armed.value === 'armed' ? 'main' : ''}
+          onClick=${() => (armed.value === 'armed' ? disarm() : (setPaused(false), arm(trigger, seconds)))}>
+            ${{ armed: 'Armed: waiting; disarm', fired: 'Fired; arm again' }[armed.value] ?? 'Arm'}</button>
       </section>
     </div>`;
 }
