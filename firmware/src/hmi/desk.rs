@@ -61,6 +61,31 @@ pub struct Memory {
     pub stack_used: u32,
 }
 
+/// What is written down at the desk. It is too large for a stack: a board keeps it where it has room.
+pub struct Books {
+    events: Events,
+    recorder: Recorder,
+}
+
+impl Books {
+    /// Empty.
+    pub const fn new() -> Self {
+        let commands = Commands {
+            words: [0; image::COMMAND_WORDS],
+        };
+        Self {
+            events: Events::new(),
+            recorder: Recorder::new(commands),
+        }
+    }
+}
+
+impl Default for Books {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// The desk.
 pub struct Desk<M: RawMutex> {
     /// The board.
@@ -88,8 +113,8 @@ pub(super) struct Papers {
     pub auth: Auth,
     pub setup: Setup,
     pub keeper: Keeper,
-    pub events: Events,
-    pub recorder: Recorder,
+    pub events: &'static mut Events,
+    pub recorder: &'static mut Recorder,
     pub panel: Panel,
     pub timed: Timed,
     pub gains: Known,
@@ -122,21 +147,16 @@ enum Then {
 }
 
 impl<M: RawMutex> Desk<M> {
-    /// The desk of a board at power-up, with the machine that it simulates; it keeps no settings.
-    pub fn new(board: Board, machine: &Machine) -> Self {
-        Self::keeping(board, Keeper::nowhere(machine))
-    }
-
     /// The desk of a board at power-up, with the settings that it keeps.
-    pub fn keeping(board: Board, keeper: Keeper) -> Self {
+    pub fn new(board: Board, keeper: Keeper, books: &'static mut Books) -> Self {
         let machine = &keeper.settings().machine;
-        // What is computed is so before the desk is laid out, which then need not be moved to its place.
         let setup = Setup::new(machine);
         let gains = Known::new(machine);
-        let mut events = Events::default();
+        let Books { events, recorder } = books;
         if let Some(why) = keeper.unusable() {
             events.add(0, "settings", format_args!("defaults: {why}"));
         }
+        recorder.begin(0, Beginning::PowerUp, Commands::of(machine));
         Self {
             board,
             cycles: Watch::new(),
@@ -147,7 +167,7 @@ impl<M: RawMutex> Desk<M> {
                 auth: Auth::new(),
                 setup,
                 events,
-                recorder: Recorder::new(Commands::of(machine)),
+                recorder,
                 panel: Panel::new(machine),
                 timed: Timed::default(),
                 gains,

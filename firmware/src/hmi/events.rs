@@ -24,7 +24,7 @@ pub struct Event {
 }
 
 /// The events.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Events {
     ring: Deque<Event, EVENTS>,
     last: u32,
@@ -40,6 +40,15 @@ const CODES: [(&Signal, &str); 4] = [
 ];
 
 impl Events {
+    /// Nothing has happened yet.
+    pub const fn new() -> Self {
+        Self {
+            ring: Deque::new(),
+            last: 0,
+            seen: [0; _],
+        }
+    }
+
     /// Something has happened.
     pub fn add(&mut self, cycle: u32, kind: &'static str, text: fmt::Arguments) {
         self.last = self.last.wrapping_add(1);

@@ -109,7 +109,7 @@ pub struct Recorder {
 
 impl Recorder {
     /// A recording from power-up.
-    pub fn new(first: Commands) -> Self {
+    pub const fn new(first: Commands) -> Self {
         Self {
             beginning: Beginning::PowerUp,
             first,
@@ -118,7 +118,11 @@ impl Recorder {
             known: first,
             counting: false,
             beaten: false,
-            end: Mark::default(),
+            end: Mark {
+                after: 0,
+                ticks: 0,
+                trajectory: 0,
+            },
             full: false,
             playing: None,
         }

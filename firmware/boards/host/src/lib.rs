@@ -184,7 +184,9 @@ impl Board {
             Some(kept) => (kept.keeper, Some(kept.store)),
             None => (Keeper::nowhere(&Machine::news_8000()), None),
         };
-        let desk = Arc::new(Desk::keeping(BOARD, keeper));
+        // For good, as on every board: a process has few of them.
+        let books = Box::leak(Box::default());
+        let desk = Arc::new(Desk::new(BOARD, keeper, books));
         let image = Arc::new(ImageCell::new(RefCell::new(options.image)));
         let control = Control::new(options.access);
         let control = Arc::new(ControlCell::new(RefCell::new(control)));

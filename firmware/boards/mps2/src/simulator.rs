@@ -10,7 +10,7 @@ use board_cortex_m::net::{LocalDesk, LocalServed, LocalService};
 use embassy_executor::Spawner;
 use embassy_time::Instant;
 use firmware::SPANS;
-use firmware::hmi::desk::{AtDesk, Board};
+use firmware::hmi::desk::{AtDesk, Board, Books};
 use firmware::life::Started;
 use firmware::store::{Keeper, Store};
 use firmware::tasks::{self, Hands};
@@ -19,7 +19,7 @@ use model_core::logic::Logic;
 use model_core::machine::Machine;
 use model_core::restart::Restart;
 use model_core::simulator::Plant;
-use static_cell::StaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::settings::Flash;
 use crate::trace::Traced;
@@ -74,6 +74,7 @@ pub struct Given {
 pub async fn background(machine: &'static Machine, exchange: &'static Exchange, given: Given) {
     static SERVED: StaticCell<LocalServed> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
+    static BOOKS: ConstStaticCell<Books> = ConstStaticCell::new(Books::new());
 
     let service = SERVED.init_with(|| LocalServed::new(machine)).service();
     let board = Board {
@@ -84,7 +85,7 @@ pub async fn background(machine: &'static Machine, exchange: &'static Exchange, 
         memory: board_cortex_m::memory::used,
     };
     let (_, line) = given.keeper.in_use();
-    let desk = &*DESK.init_with(|| LocalDesk::keeping(board, given.keeper));
+    let desk = &*DESK.init(LocalDesk::new(board, given.keeper, BOOKS.take()));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(logic(machine, exchange, service, desk).expect("first"));

@@ -33,13 +33,13 @@ use embassy_stm32::interrupt::{InterruptExt, Priority};
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::{Peri, interrupt, pac};
 use embassy_time::{Duration, Instant};
-use firmware::hmi::desk::Board;
+use firmware::hmi::desk::{Board, Books};
 use firmware::store::{Keeper, Store};
 use model_core::machine::Machine;
 use model_core::restart::Restart;
 use settings::Sectors;
 use simulator::Exchange;
-use static_cell::StaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 static PLANT: InterruptExecutor = InterruptExecutor::new();
 static DRIVE: InterruptExecutor = InterruptExecutor::new();
@@ -186,6 +186,7 @@ struct Given {
 async fn all_else(machine: &'static Machine, exchange: &'static Exchange, given: Given) {
     static SERVED: StaticCell<LocalServed> = StaticCell::new();
     static DESK: StaticCell<LocalDesk> = StaticCell::new();
+    static BOOKS: ConstStaticCell<Books> = ConstStaticCell::new(Books::new());
     let service = SERVED.init_with(|| LocalServed::new(machine)).service();
     let board = Board {
         name: "NUCLEO-H743ZI2",
@@ -195,7 +196,7 @@ async fn all_else(machine: &'static Machine, exchange: &'static Exchange, given:
         memory: board_cortex_m::memory::used,
     };
     let (network, serial) = given.keeper.in_use();
-    let desk = &*DESK.init_with(|| LocalDesk::keeping(board, given.keeper));
+    let desk = &*DESK.init(LocalDesk::new(board, given.keeper, BOOKS.take()));
     // SAFETY: an embassy executor polls this task.
     let spawner = unsafe { Spawner::for_current_executor() }.await;
     spawner.spawn(simulator::logic(machine, exchange, service, desk).expect("first"));
