@@ -19,7 +19,7 @@ use super::answer::{Detail, List, Refusal, Text};
 use super::body::is_shallow;
 
 /// Signals in one stream.
-const SIGNALS_MAX: usize = 64;
+const SIGNALS_MAX: usize = 96;
 /// Samples a second.
 const HZ_MAX: u32 = 50;
 /// Unless the client says otherwise.

@@ -131,10 +131,10 @@ impl Bench {
             .unwrap_or_else(|error| panic!("{error:#}\n{}", self.log.last(20)))
     }
 
-    /// What stands in the command block.
-    pub fn commands(&mut self) -> Commands {
-        self.link
-            .read_commands()
+    /// What stands in the command block; asked on a connection of its own, since one that is idle is closed.
+    pub fn commands(&self) -> Commands {
+        Link::connect(self.modbus())
+            .and_then(|mut link| link.read_commands())
             .unwrap_or_else(|error| panic!("{error:#}\n{}", self.log.last(20)))
     }
 

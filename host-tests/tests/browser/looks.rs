@@ -108,6 +108,12 @@ fn every_page_is_whole_readable_and_named_at_every_width() {
         for name in PAGES {
             bench.show(name);
             bench.page.until("!document.querySelector('main .wait')");
+            if name == "link" {
+                // every register has come
+                bench.page.until(
+                    "[...document.querySelectorAll('.registers td:nth-child(3)')].every((t) => t.textContent.trim() !== '–')",
+                );
+            }
             let at = format!("{name} at {width} px, {scheme}");
 
             let wide = bench
