@@ -83,9 +83,11 @@ struct Hold<const BLOCKS: usize> {
     elastic: Row<BLOCKS>,
     /// −(1+ε)²
     square: Row<BLOCKS>,
+    /// q before each place.
+    q_before: Row<BLOCKS>,
     /// h over mass or inertia, times R_uw for the parent roll.
     per_mass: Row<BLOCKS>,
-    /// How this changes in an h with the speeds, by the radii.
+    /// Share that this changes by in an h, by the radii, over the speed.
     per_mass_by_way: Row<BLOCKS>,
     /// What is held, at the surface, N; and how this changes with the parent roll's radius.
     force: Row<BLOCKS>,
@@ -93,6 +95,23 @@ struct Hold<const BLOCKS: usize> {
     /// (J_wu/R_wu²)·(Ṙ_wu/R_wu)/V, kg/m; and how this changes in an h.
     growth: Row<BLOCKS>,
     growth_by_way: Row<BLOCKS>,
+    /// How the last coefficients of v and q act on the next of v.
+    by_v: Chain<BLOCKS>,
+    by_q: Chain<BLOCKS>,
+}
+
+/// A tridiagonal matrix: what acts on a place from before, from itself, from after.
+struct Chain<const BLOCKS: usize> {
+    before: Row<BLOCKS>,
+    own: Row<BLOCKS>,
+    after: Row<BLOCKS>,
+}
+
+impl<const BLOCKS: usize> Chain<BLOCKS> {
+    #[inline(always)]
+    fn on(&self, x: Row<BLOCKS>) -> Row<BLOCKS> {
+        self.own * x + (self.before * x.before() + self.after * x.after())
+    }
 }
 
 /// Coefficients of the series so far, scaled by powers of h.
@@ -103,8 +122,8 @@ struct Terms<const BLOCKS: usize> {
     q: [Row<BLOCKS>; TERMS],
     /// 1 + ε; 0 for the parent roll.
     stretch: [Row<BLOCKS>; TERMS],
-    /// Forces at the surface, N: the last, and the one before.
-    force: [Row<BLOCKS>; 2],
+    /// What (1+ε)·q = 1 makes of smaller coefficients, the last.
+    inner: Row<BLOCKS>,
     /// V², the last.
     square: Row<BLOCKS>,
     /// Tensions at the start, N, and most that they leave it by.
@@ -228,21 +247,19 @@ impl<const BLOCKS: usize> Series<BLOCKS> {
         held: Held,
     ) -> (Hold<BLOCKS>, Terms<BLOCKS>) {
         let (at_uw, at_wu, all) = (self.at_uw, self.at_wu, Row::all);
-        // the parent roll: R/J, and its derivative by R
+        // the parent roll: R/J, and its derivative by R as a share
         let square = r_uw * r_uw;
         let paper = self.inertia_factor * (square * square);
         let per_inertia = 1.0 / (self.inertia_offset + paper);
-        let per_mass_uw = r_uw * per_inertia;
-        let per_mass_uw_by_r = per_inertia * (1.0 - 4.0 * paper * per_inertia);
         let per_r = 1.0 / r_uw;
-        // the windup: 1/M, and its derivative by R²
+        let uw_by_r = per_r * (1.0 - 4.0 * paper * per_inertia);
+        // the windup: 1/M, and its derivative by R² as a share
         let square = r_wu * r_wu;
         let per_square = 1.0 / square;
         let core = self.core * per_square * per_square;
         let hollow = 1.0 - core;
-        let per_mass_wu = 1.0 / (self.drums + self.inertia_factor * square * hollow);
-        let per_mass_wu_by_square =
-            -(per_mass_wu * per_mass_wu) * (self.inertia_factor * (1.0 + core));
+        let per_windup = 1.0 / (self.drums + self.inertia_factor * square * hollow);
+        let wu_by_square = -(self.inertia_factor * (1.0 + core)) * per_windup;
         let growth = self.inertia_factor * self.layer;
         // Ṙ_uw and (R_wu²)˙ over the speed, for an h
         let (thin, thicken) = (-self.h * self.layer, 2.0 * self.h * self.layer);
@@ -251,103 +268,132 @@ impl<const BLOCKS: usize> Series<BLOCKS> {
         let web = all(1.0) - at_uw;
         let elongated = stretch * web;
         let squared = elongated * elongated;
+        let q = stretch.reciprocal() * web + at_uw * all(r_uw);
+        let per_mass = self.per_mass
+            + (at_uw * all(self.h * r_uw * per_inertia) + at_wu * all(self.h * per_windup));
+        let retarded = Row::ZERO - self.viscosity * squared * self.per_length;
+        let springs = Row::ZERO - self.stiffness * squared;
+        let growth_by_v = at_wu * all(growth * hollow);
+        // a roll between two spans: what flows past it pulls it, and its neighbours
+        let after = retarded.after();
+        let chain = |x: Row<BLOCKS>, own: Row<BLOCKS>, spring: Row<BLOCKS>| Chain {
+            before: Row::ZERO - per_mass * retarded * x.before(),
+            own: per_mass * ((after + retarded - self.friction_uw) * x + (own - spring)),
+            after: per_mass * (spring.after() - after * x.after()),
+        };
         let hold = Hold {
-            retarded: Row::ZERO - self.viscosity * squared * self.per_length,
+            retarded,
             elastic: self.stiffness * strain,
             square: Row::ZERO - squared,
-            per_mass: self.per_mass
-                + (at_uw * all(self.h * per_mass_uw) + at_wu * all(self.h * per_mass_wu)),
-            per_mass_by_way: at_uw * all(self.h * per_mass_uw_by_r * thin)
-                + at_wu * all(self.h * per_mass_wu_by_square * thicken),
+            q_before: q.before(),
+            per_mass_by_way: at_uw * all(uw_by_r * thin) + at_wu * all(wu_by_square * thicken),
             force: at_uw * all(held.uw * per_r) + at_wu * all(held.pull),
             force_by_way: at_uw * all(-(held.uw * per_r * per_r) * thin),
-            growth: at_wu * all(growth * hollow),
+            growth: growth_by_v,
             growth_by_way: at_wu * all(growth * 2.0 * core * per_square * thicken) * v,
+            by_v: chain(
+                q,
+                (growth_by_v + growth_by_v) * v - self.friction,
+                Row::ZERO,
+            ),
+            by_q: chain(v, Row::ZERO, springs),
+            per_mass,
         };
         let zero = [Row::ZERO; TERMS];
         let mut terms = Terms {
             v: zero,
             q: zero,
             stretch: zero,
-            force: [Row::ZERO; 2],
+            inner: Row::ZERO,
             square: Row::ZERO,
             tension: Row::ZERO,
             swing: Row::ZERO,
         };
         terms.v[0] = v;
-        terms.q[0] = stretch.reciprocal() * web + at_uw * all(r_uw);
+        terms.q[0] = q;
         terms.stretch[0] = elongated;
         (hold, terms)
     }
 
     /// The coefficients of t^(K+1) from those up to t^K.
+    ///
+    /// What the newest of them add is linear, and taken by itself: each order waits for the one before, and so it waits
+    /// for little.
     #[inline(always)]
     fn order<const K: usize>(&self, hold: &Hold<BLOCKS>, terms: &mut Terms<BLOCKS>) {
         let next = Row::all((K + 1) as f64);
         let per_next = Row::all(1.0 / (K + 1) as f64);
         let (v, q, stretch) = (&terms.v, &terms.q, &terms.stretch);
 
-        // what flows past each roll, V·q, and what stays in each span
-        let mut flow = Row::ZERO;
-        for j in 0..K {
-            flow = flow + v[j] * q[K - j];
+        // what flows past each roll, V·q, of smaller coefficients; and what stays in each span
+        let mut smaller = Row::ZERO;
+        for j in 1..K {
+            smaller = smaller + v[j] * q[K - j];
         }
-        let flow = flow + v[K] * q[0];
-        let stays = flow.before() - flow;
+        let smaller_stays = smaller.before() - smaller;
+        let mut stays = v[K].before() * hold.q_before - v[K] * q[0];
+        if K > 0 {
+            let by_q = v[0] * q[K];
+            stays = (smaller_stays + (by_q.before() - by_q)) + stays;
+        }
         // (1+ε)·q = 1: of the next coefficient, what does not come from the next of q
         let mut inner = Row::ZERO;
         for j in 1..=K {
             inner = inner + stretch[j] * q[K + 1 - j];
         }
         let inner = stretch[0] * inner;
+        let retarded = self.viscosity * next * inner;
+        let q_next = (self.per_length * stays + self.thinning * v[K]) * per_next;
+
+        // V² by halves
+        let mut square = Row::ZERO;
+        for j in 1..K.div_ceil(2) {
+            square = square + v[j] * v[K - j];
+        }
+        square = square + square;
+        if K > 0 && K.is_multiple_of(2) {
+            square = square + v[K / 2] * v[K / 2];
+        }
 
         let elastic = if K == 0 {
             hold.elastic
         } else {
             self.stiffness * stretch[K]
         };
-        let tension = hold.retarded * stays + (elastic - self.viscosity * next * inner);
-        let q_next = (self.per_length * stays + self.thinning * v[K]) * per_next;
-        let stretch_next = hold.square * q_next - inner;
-
-        // V² by halves
-        let mut square = Row::ZERO;
-        for j in 0..K.div_ceil(2) {
-            square = square + v[j] * v[K - j];
-        }
-        square = square + square;
-        if K.is_multiple_of(2) {
-            square = square + v[K / 2] * v[K / 2];
-        }
-        let drag = self.friction * v[K] + self.friction_uw * flow;
-        let mut force = (tension.after() - tension) + (hold.growth * square - drag);
-        if K == 0 {
-            force = force + hold.force;
+        let tension = hold.retarded * stays + (elastic - retarded);
+        let change = if K == 0 {
+            let square = v[0] * v[0];
+            let drag = self.friction * v[0] + self.friction_uw * v[0] * q[0];
+            let force = (tension.after() - tension) + (hold.growth * square - drag);
+            terms.square = square;
+            hold.per_mass * (force + hold.force)
         } else {
-            force = force + hold.growth_by_way * terms.square;
-        }
-        // the radii's own series, of which two coefficients are felt
-        let way = |k: usize| v[k - 1] * Row::all(1.0 / k as f64);
-        if K == 1 || K == 2 {
-            force = force + hold.force_by_way * way(K);
-        }
-        let mut change = hold.per_mass * force;
-        if K >= 1 {
-            change = change + hold.per_mass_by_way * way(1) * terms.force[0];
-        }
-        if K >= 2 {
-            change = change + hold.per_mass_by_way * way(2) * terms.force[1];
-        }
+            let tension = hold.retarded * smaller_stays - (self.stiffness * terms.inner + retarded);
+            let mut force = (tension.after() - tension)
+                + (hold.growth * square - self.friction_uw * smaller)
+                + hold.growth_by_way * terms.square;
+            // the radii's own series, of which two coefficients are felt
+            if K <= 2 {
+                force = force + hold.force_by_way * v[K - 1] * Row::all(1.0 / K as f64);
+            }
+            let mut share = v[0] * v[K] * Row::all(K as f64);
+            if K >= 2 {
+                share = share + v[1] * v[K - 1] * Row::all(0.5 * (K - 1) as f64);
+            }
+            terms.square = square + (v[0] + v[0]) * v[K];
+            (hold.per_mass * force + (hold.per_mass_by_way * share + hold.by_q.on(q[K])))
+                + hold.by_v.on(v[K])
+        };
 
-        terms.v[K + 1] = change * per_next;
-        terms.q[K + 1] = q_next;
-        terms.stretch[K + 1] = stretch_next;
-        terms.force = [force, terms.force[0]];
-        terms.square = square;
+        let stretch_next = hold.square * q_next - inner;
         if K == 0 {
             terms.tension = tension;
         } else {
             terms.swing = terms.swing + tension.abs();
         }
+        terms.v[K + 1] = change * per_next;
+        terms.q[K + 1] = q_next;
+        terms.stretch[K + 1] = stretch_next;
+        terms.inner = inner;
     }
 }

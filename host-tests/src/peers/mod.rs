@@ -312,8 +312,8 @@ fn print(built: &[Option<Built>], points: &[Vec<Point>], missing: &mut Vec<Strin
     }
     println!(
         "\nCost relative to this model's at equal error, the quickest method of each, and what is wanted at least. The first \
-         pair is beside the real-time path, which all others beat by a higher order or not at all; the bars are for runs \
-         without a PLC.\n\n\
+         pair is beside RK4 as the real-time path takes it. The others are beside a stride, which is more exact than the first \
+         error asks for; what is wanted, is wanted at its own, the last pair.\n\n\
          | Library | RK4 at {real_time:.0e} | Instructions | Wanted | At {real_time:.0e} | Instructions | At {offline:.0e} | Instructions |\n\
          |---|---:|---:|---:|---:|---:|---:|---:|"
     );
@@ -343,16 +343,13 @@ fn print(built: &[Option<Built>], points: &[Vec<Point>], missing: &mut Vec<Strin
             number(*bar, 1),
             ratios.map(|ratio| number(ratio, 2)).join(" | ")
         );
-        let places = [(real_time, ratios[0]), (offline, ratios[2])];
-        for (error, ratio) in places {
-            // a method that does not get there has no time to compare
-            if let (Some(bar), Some(ratio)) = (*bar, ratio)
-                && ratio < bar
-            {
-                missing.push(format!(
-                    "{bar} times the speed of {library} at an error of {error:.0e}: it is {ratio:.2} times"
-                ));
-            }
+        // a method that does not get there has no time to compare
+        if let (Some(bar), Some(ratio)) = (*bar, ratios[2])
+            && ratio < bar
+        {
+            missing.push(format!(
+                "{bar} times the speed of {library} at an error of {offline:.0e}: it is {ratio:.2} times"
+            ));
         }
     }
 }
@@ -396,6 +393,9 @@ fn draw(points: &[Vec<Point>]) -> Result<()> {
             .filter(|p| p.error > 0.0 && p.error < 1.0)
             .map(|p| (-p.error.log10(), (1e6 * p.seconds).log10()))
             .collect();
+        // where rounding has the last word, a finer setting is only dearer
+        let all: Vec<(f64, f64)> = points.clone();
+        points.retain(|p| !all.iter().any(|q| q.0 >= p.0 && q.1 < p.1));
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         Curve::new(&format!("{library}, {method}"), ink, points)
     };
@@ -407,7 +407,7 @@ fn draw(points: &[Vec<Point>]) -> Result<()> {
             curve(Ink::Reference, PRODUCT, REAL_TIME),
         ];
         Panel {
-            title: format!("{title}: log₁₀ of the CPU time of a hold, µs"),
+            title: format!("{title}: log₁₀ µs of a hold"),
             height: 190.0,
             curves: ours.into_iter().chain(theirs).collect(),
             band: None,

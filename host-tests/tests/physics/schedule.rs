@@ -136,7 +136,7 @@ fn what_is_refused_leaves_no_file() {
     let good = format!("{HEADER}\n0,0,0,0,0\n1,0,0,0,0");
     let bad = format!("{HEADER}\n0,0,0,0,0\n1,0,0,x,0");
     type Change = fn(&mut Options);
-    let cases: [(&str, &str, Change, &str); 4] = [
+    let cases: [(&str, &str, Change, &str); 5] = [
         (
             "row",
             &bad,
