@@ -423,8 +423,8 @@ fn draw(points: &[Vec<Point>]) -> Result<()> {
             .to_owned(),
     };
     let svg = figure.svg();
-    let dir = Path::new("out").join("figures");
-    fs::create_dir_all(&dir)
+    let dir = Path::new("out");
+    fs::create_dir_all(dir)
         .with_context(|| format!("cannot make the directory {}", dir.display()))?;
     let pictures = [("svg", svg.clone().into_bytes()), ("png", plot::png(&svg)?)];
     for (kind, picture) in pictures {
