@@ -110,9 +110,7 @@ pub fn series(problem: &Problem, strides: u32, out: &mut Vec<[f64; STATES]>) -> 
             pull: load.pull,
         };
         for _ in 0..strides {
-            x = smooth
-                .advance(&x, held)
-                .ok_or("the web is slack or torn")?;
+            x = smooth.advance(&x, held).ok_or("the web is slack or torn")?;
         }
         out.push(states(&x));
     }
