@@ -17,6 +17,7 @@ pub mod link;
 pub mod log;
 pub mod machine_file;
 pub mod namespace;
+pub mod peers;
 pub mod plant;
 pub mod plc;
 pub mod plot;

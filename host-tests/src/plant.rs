@@ -21,12 +21,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use clap::ValueEnum;
 use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::fixed::Word;
 use model_core::machine::{Machine, MachineError, PRESETS};
 use model_core::plant::windup::ROLLS;
 use model_core::plant::{PLANT_PERIOD_MS, Winder};
 use model_core::real::{self, Real};
+use offline::Strider;
 
 use crate::batch;
 use crate::machine_file::Description;
@@ -63,6 +65,10 @@ pub struct Options {
     /// Numbers to compute with; the microcontroller has f32 [default: f64; with --sweep f32, which is quickest]
     #[arg(long, value_enum)]
     pub scalar: Option<Scalar>,
+    /// How the winder gets on; with `series` a steady stretch takes half the time, and has digits that `rk4` has not.
+    /// In f64
+    #[arg(long, value_enum, default_value_t = Stepper::Rk4, conflicts_with = "sweep")]
+    pub stepper: Stepper,
     /// Time from row to row of the output, a multiple of 0.004 s
     #[arg(
         long = "every",
@@ -101,6 +107,15 @@ pub enum Scalar {
     Fixed,
 }
 
+/// How a winder gets on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Stepper {
+    /// The steps of the real-time path.
+    Rk4,
+    /// Strides by a series where nothing but the motors moves the winder and its web stays taut; else the same steps.
+    Series,
+}
+
 /// Reads the schedule, runs the plant, writes the result.
 ///
 /// `console` gets a line about what was done, or the result itself when the output file is `-`. Nothing is
@@ -109,23 +124,40 @@ pub fn run(options: &Options, console: &mut dyn Write) -> Result<()> {
     if let Some(file) = &options.sweep {
         return batch::run(options, file, console);
     }
+    if let (Stepper::Series, Some(scalar @ (Scalar::F32 | Scalar::Fixed))) =
+        (options.stepper, options.scalar)
+    {
+        let name = scalar.to_possible_value();
+        let name = name.as_ref().map_or("", |value| value.get_name());
+        bail!("--stepper series computes in f64 only, not in {name}; --stepper rk4 does");
+    }
     let machine = options.machine.as_deref().unwrap_or(PRESETS[0].0);
     let machine = Description::find(machine)?.machine;
     let every = output_period(options.every_s)?;
     let schedule = Schedule::open(&options.schedule)?;
-    let simulate = match options.scalar.unwrap_or(Scalar::F64) {
-        Scalar::F32 => simulate::<f32>,
-        Scalar::F64 => simulate::<f64>,
-        Scalar::Fixed => simulate::<Word>,
+    let simulate = |out: &mut dyn Write| match (options.stepper, options.scalar) {
+        (Stepper::Rk4, None | Some(Scalar::F64)) => {
+            simulate::<f64>(&machine, &schedule, every, &Steps, out)
+        }
+        (Stepper::Rk4, Some(Scalar::F32)) => {
+            simulate::<f32>(&machine, &schedule, every, &Steps, out)
+        }
+        (Stepper::Rk4, Some(Scalar::Fixed)) => {
+            simulate::<Word>(&machine, &schedule, every, &Steps, out)
+        }
+        (Stepper::Series, _) => {
+            let strider = Strider::new(&machine, H);
+            simulate::<f64>(&machine, &schedule, every, &strider, out)
+        }
     };
     if options.out.as_os_str() == "-" {
-        simulate(&machine, &schedule, every, console)?;
+        simulate(console)?;
         return Ok(());
     }
     let path = options.out.display();
     let file = File::create(&options.out).with_context(|| format!("cannot write {path}"))?;
     let mut file = BufWriter::new(file);
-    let run = simulate(&machine, &schedule, every, &mut file)
+    let run = simulate(&mut file)
         .and_then(|run| Ok(file.flush().map(|()| run)?))
         .with_context(|| format!("cannot write {path}"))?;
     for event in run.events {
@@ -255,11 +287,6 @@ impl Schedule {
         let pairs = self.rows.windows(2);
         pairs.map(|pair| (&pair[0], pair[0].tick..pair[1].tick))
     }
-
-    /// What holds at each step, from the first.
-    fn steps(&self) -> impl Iterator<Item = &Row> {
-        self.rows().flat_map(|(row, steps)| steps.map(move |_| row))
-    }
 }
 
 /// The fields of a line, without blanks, quotes and the mark that some programs put before the first.
@@ -384,15 +411,53 @@ macro_rules! with_spans {
 }
 pub(crate) use with_spans;
 
+/// What takes a winder on.
+trait Pace<R: real::Scalar> {
+    /// By at most so many steps, and at least one, under held actuators; tells by how many.
+    fn advance<const SPANS: usize>(
+        &self,
+        winder: &mut Winder<R, SPANS>,
+        actuators: &Actuators<R::Si>,
+        most: u64,
+    ) -> u64;
+}
+
+/// Step by step.
+struct Steps;
+
+impl<R: real::Scalar> Pace<R> for Steps {
+    fn advance<const SPANS: usize>(
+        &self,
+        winder: &mut Winder<R, SPANS>,
+        actuators: &Actuators<R::Si>,
+        _: u64,
+    ) -> u64 {
+        winder.step(actuators);
+        1
+    }
+}
+
+impl Pace<f64> for Strider {
+    fn advance<const SPANS: usize>(
+        &self,
+        winder: &mut Winder<f64, SPANS>,
+        actuators: &Actuators<f64>,
+        most: u64,
+    ) -> u64 {
+        Strider::advance(self, winder, actuators, most)
+    }
+}
+
 /// [`simulate_spans`] with the machine's number of spans.
 fn simulate<R: real::Scalar>(
     machine: &Machine,
     schedule: &Schedule,
     every: u64,
+    pace: &impl Pace<R>,
     out: &mut dyn Write,
 ) -> Result<Run> {
     with_spans!(machine.idle.len() + 1, |SPANS| {
-        simulate_spans::<R, SPANS>(machine, schedule, every, out)
+        simulate_spans::<R, SPANS>(machine, schedule, every, pace, out)
     })
 }
 
@@ -401,6 +466,7 @@ fn simulate_spans<R: real::Scalar, const SPANS: usize>(
     machine: &Machine,
     schedule: &Schedule,
     every: u64,
+    pace: &impl Pace<R>,
     out: &mut dyn Write,
 ) -> Result<Run> {
     let mut winder = at_start::<R, SPANS>(machine)?;
@@ -417,22 +483,28 @@ fn simulate_spans<R: real::Scalar, const SPANS: usize>(
             .push(format!("{steps} steps of integration in 4 ms: {note}"));
     }
     let mut before = Incidents::of(&winder);
-    for (step, row) in (1_u64..).zip(schedule.steps()) {
-        winder.step(&Actuators {
+    for (row, steps) in schedule.rows() {
+        let actuators = Actuators {
             torque: row.torque.map(R::Si::of),
             brakes: row.brakes,
             ..Actuators::default()
-        });
-        let now = Incidents::of(&winder);
-        if now != before {
-            let time = seconds(step);
-            let events = now.since(&before).map(|what| format!("{time} s: {what}"));
-            let room = MOST_EVENTS.saturating_sub(run.events.len());
-            run.events.extend(events.take(room));
-            before = now;
-        }
-        if step.is_multiple_of(every) {
-            write_row(out, step, &winder)?;
+        };
+        let mut step = steps.start;
+        while step < steps.end {
+            // no further than the row goes, and the next one of the output
+            let most = (steps.end - step).min(every - step % every);
+            step += pace.advance(&mut winder, &actuators, most);
+            let now = Incidents::of(&winder);
+            if now != before {
+                let time = seconds(step);
+                let events = now.since(&before).map(|what| format!("{time} s: {what}"));
+                let room = MOST_EVENTS.saturating_sub(run.events.len());
+                run.events.extend(events.take(room));
+                before = now;
+            }
+            if step.is_multiple_of(every) {
+                write_row(out, step, &winder)?;
+            }
         }
     }
     Ok(run)

@@ -249,8 +249,8 @@ fn installed(names: &[&str], what: &str, by_hand: &str) -> Result<PathBuf> {
     present().with_context(|| format!("apt-get has installed {package}, but it is not on the PATH"))
 }
 
-/// Installs a Debian package.
-fn debian(package: &str, what: &str, by_hand: &str) -> Result<()> {
+/// Installs a Debian package; `by_hand` says what else would do.
+pub fn debian(package: &str, what: &str, by_hand: &str) -> Result<()> {
     let install = ["install", "-y", "--no-install-recommends", package];
     ensure!(
         on_path("apt-get").is_some(),

@@ -9,7 +9,7 @@ use std::fs;
 
 use host_tests::batch::group::{Extremes, Progress, Run, side_by_side};
 use host_tests::batch::lanes::{LANES, Lanes};
-use host_tests::plant::{self, Options, Scalar, Schedule};
+use host_tests::plant::{self, Options, Scalar, Schedule, Stepper};
 use model_core::exchange::{Actuators, Brakes, BySection};
 use model_core::machine::Machine;
 use model_core::plant::Winder;
@@ -360,6 +360,7 @@ fn a_row_of_a_sweep_is_the_end_of_a_single_run() {
             out: path("out.csv"),
             machine,
             scalar,
+            stepper: Stepper::Rk4,
             every_s: 6.0,
             sweep: sweep.map(path),
         };
@@ -410,6 +411,7 @@ fn a_sweep_that_is_refused_leaves_no_file() {
         out: path("out.csv"),
         machine: None,
         scalar: None,
+        stepper: Stepper::Rk4,
         every_s: 1.0,
         sweep: Some(path("sweep.toml")),
     };

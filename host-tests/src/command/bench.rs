@@ -19,6 +19,7 @@ use model_core::twin::{self, Course, Extent};
 use crate::batch;
 use crate::flops::{self, Floor};
 use crate::interrupt;
+use crate::peers;
 use crate::setup::{self, Warnings};
 use crate::twin::{CORES, Section, Twin};
 
@@ -37,6 +38,9 @@ pub struct Args {
     /// With --link, a thousand connections a second for a minute too
     #[arg(long, requires = "link")]
     connects: bool,
+    /// The product beside other integrators on the same winder, and nothing else
+    #[arg(long, conflicts_with_all = ["machines", "scalars", "link"])]
+    peers: bool,
 }
 
 type Floors = BTreeMap<&'static str, Floor>;
@@ -101,6 +105,9 @@ pub fn main(args: &Args) -> Result<ExitCode> {
     if args.link {
         return super::link_bench::main(args.connects);
     }
+    if args.peers {
+        return beside_peers();
+    }
     let names: Vec<&str> = match &args.machines[..] {
         [] => MACHINES.to_vec(),
         names => names.iter().map(String::as_str).collect(),
@@ -162,6 +169,20 @@ pub fn main(args: &Args) -> Result<ExitCode> {
         println!("\nNot measured: {what}");
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Fails where something was not measured, is wrong, or slower than wanted.
+fn beside_peers() -> Result<ExitCode> {
+    let mut missing = Vec::new();
+    peers::compare(&mut missing)?;
+    for what in &missing {
+        println!("\nMissed: {what}");
+    }
+    Ok(if missing.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }
 
 /// The twins that could be had, by the places of their cores.

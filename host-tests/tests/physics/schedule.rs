@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use host_tests::plant::{self, Options, Scalar};
+use host_tests::plant::{self, Options, Scalar, Stepper};
 use model_core::fixed::Word;
 use model_core::machine::Machine;
 use tempfile::TempDir;
@@ -22,6 +22,7 @@ fn options(schedule: &str) -> (TempDir, Options) {
         out: path.join("out.csv"),
         machine: None,
         scalar: None,
+        stepper: Stepper::Rk4,
         every_s: 1.0,
         sweep: None,
     };
@@ -135,7 +136,7 @@ fn what_is_refused_leaves_no_file() {
     let good = format!("{HEADER}\n0,0,0,0,0\n1,0,0,0,0");
     let bad = format!("{HEADER}\n0,0,0,0,0\n1,0,0,x,0");
     type Change = fn(&mut Options);
-    let cases: [(&str, &str, Change, &str); 4] = [
+    let cases: [(&str, &str, Change, &str); 5] = [
         (
             "row",
             &bad,
@@ -155,6 +156,12 @@ fn what_is_refused_leaves_no_file() {
             "NEWS-8000",
         ),
         ("period", &good, |o| o.every_s = H / 2.0, "--every 0.002 "),
+        (
+            "series in f32",
+            &good,
+            |o| (o.stepper, o.scalar) = (Stepper::Series, Some(Scalar::F32)),
+            "in f64 only, not in f32",
+        ),
     ];
     for (name, schedule, change, reason) in cases {
         let (_folder, mut options) = options(schedule);
@@ -164,4 +171,33 @@ fn what_is_refused_leaves_no_file() {
         assert!(error.contains(reason), "{error}");
         assert!(!options.out.exists() && console.is_empty(), "{name}");
     }
+}
+
+#[test]
+fn strides_lead_where_steps_lead_and_stop_at_the_same_rows() {
+    // taut, then with a drum's brake closed, then coasting; rows where no stride of four steps ends
+    let (_folder, mut options) = options(&format!(
+        "{HEADER},brake_rd\n0,-4000,700,700,0,0\n2.004,-4000,700,700,0,1\n3,-1500,300,300,0,0\n6,0,0,0,0,0\n"
+    ));
+    options.every_s = 0.5;
+    let steps = run(&options);
+    options.stepper = Stepper::Series;
+    let strides = run(&options);
+    assert_eq!(steps.len(), strides.len());
+    let scale = |column: usize| {
+        steps
+            .iter()
+            .map(|row| row[column].abs())
+            .fold(1e-3, f64::max)
+    };
+    let mut apart = 0.0_f64;
+    for (stepped, strode) in steps.iter().zip(&strides) {
+        assert_eq!(stepped[0], strode[0]);
+        for (column, (a, b)) in stepped.iter().zip(strode).enumerate().skip(1) {
+            let off = (a - b).abs() / scale(column);
+            assert!(off < 1e-5, "{a} {b} in column {column}");
+            apart = apart.max(off);
+        }
+    }
+    assert!(apart > 0.0, "no stride was taken");
 }
