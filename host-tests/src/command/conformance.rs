@@ -139,10 +139,10 @@ fn compare() -> Result<ExitCode> {
     columns.extend(peers::measure(|name| eprintln!("winder: {name} …"))?);
     print!(
         "# Conformance of Modbus TCP servers\n\n\
-         Written by `cargo winder conformance --peers`: the cases that somebody fails, and what came instead. The other \
-         servers are made as their documentation shows, with nothing added ([how](../host-tests/src/conformance/peers.rs)); \
-         what a case sends is in [pdu](../host-tests/src/conformance/pdu.rs) and \
-         [stream](../host-tests/src/conformance/stream.rs).\n\n{}",
+         Written by `cargo winder conformance --peers`: the cases that somebody fails, and what came instead. The other\n\
+         servers are made as their documentation shows, with nothing added ([how](../host-tests/src/conformance/peers.rs)).\n\
+         What a case does: [requests](../host-tests/src/conformance/pdu.rs),\n\
+         [connections](../host-tests/src/conformance/stream.rs).\n\n{}",
         peers::table(&columns)
     );
     Ok(ExitCode::SUCCESS)

@@ -27,6 +27,8 @@ const DEPTH: usize = 8;
 const CLIENTS: usize = 8;
 /// Connections a second …
 const CONNECTS: u32 = 1000;
+/// … of so many clients, …
+const CALLERS: u32 = 4;
 /// … for so long.
 const CONNECTING: Duration = Duration::from_secs(60);
 
@@ -60,7 +62,7 @@ pub fn main(long: bool) -> Result<std::process::ExitCode> {
     }
     if long {
         println!(
-            "\n{CONNECTS} connections a second, each asks once; {} s.\n\n\
+            "\nUp to {CONNECTS} connections a second, {CALLERS} at once, each asks once; {} s.\n\n\
              | Board | Connections | Not answered | Served afterwards |\n|---|---:|---:|---|",
             CONNECTING.as_secs()
         );
@@ -171,17 +173,32 @@ fn poll(address: SocketAddr, depth: usize, start: &Barrier) -> Result<Vec<Durati
     Ok(times)
 }
 
-/// Connects at a steady rate, as PLCs that have lost their link do; how often, and how often in vain.
+/// Connects at a steady rate, as PLCs that have lost their link do, [`CALLERS`] at once; how often, and how often in vain.
 fn connects(address: SocketAddr) -> Result<(u32, u32)> {
+    let counts: Vec<_> = thread::scope(|scope| {
+        let callers: Vec<_> = (0..CALLERS)
+            .map(|_| scope.spawn(|| call(address)))
+            .collect();
+        callers.into_iter().map(|caller| caller.join()).collect()
+    });
+    interrupt::check()?;
+    counts
+        .into_iter()
+        .try_fold((0, 0), |(made, failed), count| {
+            let (more_made, more_failed) = count.map_err(|_| anyhow!("a client has panicked"))?;
+            Ok((made + more_made, failed + more_failed))
+        })
+}
+
+fn call(address: SocketAddr) -> (u32, u32) {
     let began = Instant::now();
     let (mut made, mut failed) = (0, 0);
-    while began.elapsed() < CONNECTING {
-        interrupt::check()?;
+    while began.elapsed() < CONNECTING && interrupt::check().is_ok() {
         let answered = Client::connect(address).and_then(|mut client| client.ask(1));
         made += 1;
         failed += u32::from(answered.is_err());
-        let due = began + Duration::from_secs(1) / CONNECTS * made;
+        let due = began + Duration::from_secs(1) / CONNECTS * CALLERS * made;
         thread::sleep(due.saturating_duration_since(Instant::now()));
     }
-    Ok((made, failed))
+    (made, failed)
 }
