@@ -4,6 +4,7 @@
 
 use host_tests::machine_file::Description;
 use host_tests::scenario::record::Recording;
+use model_core::desk::request;
 use model_core::image;
 use model_core::logic::status;
 use model_core::machine::parameters;
@@ -178,6 +179,15 @@ fn a_fault_for_a_time_counts_down_and_goes() {
     assert_eq!(bench.commands().word(&image::FAULT_SENSORS), 0);
 }
 
+/// Presses a button of the desk, and waits until it has been let go and what it asks for is done.
+fn push(bench: &mut Bench, name: &str, button: u16) {
+    bench.page.press(name);
+    bench.page.until(&format!(
+        "Promise.all(['events?after=0', 'panel'].map((p) => fetch('/api/v1/' + p).then((a) => a.json()))).then(([e, p]) => \
+         e.events.some((e) => e.text === 'operator_request = 0 (was {button})') && p.message === '')"
+    ));
+}
+
 #[test]
 fn a_lesson_is_played_at_the_desk_to_its_full_score() {
     let mut bench = Bench::start();
@@ -198,13 +208,13 @@ fn a_lesson_is_played_at_the_desk_to_its_full_score() {
             feedback.word(&image::WINDER_STATUS) & bits == bits
         });
     };
-    bench.page.press("New core");
-    bench.page.press("New parent roll");
+    push(&mut bench, "New core", request::NEW_CORE);
+    push(&mut bench, "New parent roll", request::NEW_PARENT_ROLL);
     until(&mut bench, status::PRESET_TAKEN);
     assert_eq!(bench.commands().word(&image::OPERATOR_PARENT), 30_000);
-    bench.page.press("Drives on");
+    push(&mut bench, "Drives on", request::DRIVES_ON);
     until(&mut bench, status::DRIVES_ON);
-    bench.page.press("Web led");
+    push(&mut bench, "Web led", request::WEB_LED);
     until(&mut bench, status::WEB_THREADED);
     bench.page.press("A hint");
     bench.page.until_text("Rolls first");

@@ -5,7 +5,7 @@
  * wired follows the desk; where there is none, the operator panel does.
  */
 import { html, signal, useEffect, useState } from '../vendor/ui.js';
-import { attempt, get, info, note } from '../api.js';
+import { attempt, get, info } from '../api.js';
 import { counts, cycle, listeners, signals, want, CYCLE_S } from '../live.js';
 import { Field, Icon, Num, useGet, useLive, sentence, span } from '../parts.js';
 
@@ -15,6 +15,8 @@ const PRESS = 300;
 const MACHINE = 'NEWS-8000';
 /** The simulator is the machine at power-up, and has its new commands, after so many cycles. */
 const SETTLED = 50;
+/** Looks at whether the machine is at power-up, at most. */
+const TRIES = 20;
 /** What is no lesson's. */
 const UNUSED = /^(jog_|reset_sets)/;
 const FIELDS = [
@@ -111,8 +113,12 @@ const untouched = () =>
 /** The lesson's machine at power-up, and the desk as the lesson finds it. */
 async function begin(lesson) {
   const { revision } = await get('info');
+  const { cycles } = (await get('snapshot')).recording;
   if (!(await attempt('POST', 'parameters/preset', { name: MACHINE, revision }))) return;
   if (!(await attempt('POST', 'parameters/apply', { revision }))) return;
+  // what is commanded before the machine is at power-up would be forgotten; its recording begins anew then
+  for (let i = 0; i < TRIES && (await get('snapshot')).recording.cycles >= cycles; i++)
+    await new Promise((wait) => setTimeout(wait, 100));
   if (info.value?.control?.by === 'nobody' && !(await attempt('POST', 'panel', { action: 'take' }))) return;
   const set = { ...untouched(), bus_delay: 1, ...raw(lesson.set), 'operator_request.reset_sets': 1 };
   if (!(await attempt('POST', 'commands', set))) return;
@@ -167,15 +173,26 @@ async function press(name) {
   setTimeout(() => attempt('POST', 'commands', { [key]: 0 }), PRESS);
 }
 
+/** A set-point of the desk; what is being written stays until it is sent. */
+function SetPoint({ name, label, about }) {
+  const [entry, set] = useState(null);
+  const v = Number(entry);
+  const bad = entry !== null && (entry.trim() === '' || !(v >= about.low && v <= about.high));
+  const send = async () => {
+    if (entry === null || bad) return;
+    await attempt('POST', 'commands', { [name]: Math.round(v * about.counts) });
+    set(null);
+  };
+  return html`<${Field} label=${label} unit=${about.unit} hint=${name}
+    error=${bad ? `${about.low} to ${about.high} ${about.unit}` : ''}>${(a) => html`<input ...${a} type="number" step="any"
+      value=${entry ?? (counts(name).value ?? 0) / about.counts} onInput=${(e) => set(e.target.value)} onBlur=${send}
+      onKeyDown=${(e) => e.key === 'Enter' && send()} />`}<//>`;
+}
+
 function Desk() {
   const [panel] = useGet('panel', 700);
   const buttons = signals.value.get('operator_request')?.bits.filter((b) => !UNUSED.test(b.name)) ?? [];
   const by = info.value?.control?.by;
-  const put = (name, about, text) => {
-    const v = Number(text);
-    if (text.trim() === '' || !(v >= about.low && v <= about.high)) return note(`${v} is outside ${about.low} to ${about.high} ${about.unit}`, true);
-    return attempt('POST', 'commands', { [name]: Math.round(v * about.counts) });
-  };
   return html`<section class="card"><h2>Operator's desk</h2>
     <p class="quiet">${by === 'plc' ? 'The PLC reads it.' : 'No PLC is connected: the operator panel follows it.'}
       ${by !== 'plc' && panel?.message ? html` <b>${sentence(panel.message)}</b>` : null}</p>
@@ -185,9 +202,7 @@ function Desk() {
     <div class="buttons">${FIELDS.map(([name, label]) => {
       const about = signals.value.get(name);
       return about
-        ? html`<${Field} key=${name} label=${label} unit=${about.unit} hint=${name}>${(a) => html`<input ...${a} type="number"
-          step="any" value=${(counts(name).value ?? 0) / about.counts}
-          onChange=${(e) => put(name, about, e.target.value)} />`}<//>`
+        ? html`<${SetPoint} key=${name} name=${name} label=${label} about=${about} />`
         : null;
     })}</div></section>`;
 }
