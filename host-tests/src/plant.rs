@@ -676,7 +676,8 @@ mod tests {
         let schedule = read(&format!(
             "{HEADER}\n0,0,180,180,0\n1,4000,180,3400,0\n9,0,0,9e5,0\n10,0,0,0,0"
         ));
-        let run = simulate::<f64>(&machine, &schedule.unwrap(), 250, &mut io::sink()).unwrap();
+        let run = simulate::<f64>(&machine, &schedule.unwrap(), 250, &Steps, &mut io::sink());
+        let run = run.unwrap();
         assert_eq!(run.rows, 11);
         let told = |what: &str| run.events.iter().find(|event| event.ends_with(what));
         let slip = told("the front drum loses traction").unwrap();
