@@ -244,7 +244,7 @@ fn what_changes_something_needs_a_session_and_json() {
 fn parameters_are_staged_and_applied_as_one() {
     let board = simulator(1.0);
     let mut browser = Browser::logged_in(&board);
-    browser.wait("info", |info| info["cycle"].as_u64() > Some(2));
+    browser.wait("info", |info| info["cycle"].as_u64() > Some(9));
     let value = |page: &Value, name: &str, of: &str| {
         let parts = page["parts"].as_array().unwrap();
         let all = parts
@@ -298,7 +298,12 @@ fn parameters_are_staged_and_applied_as_one() {
         };
         word(0) << 16 | word(1)
     };
-    let image = browser.wait("image", |image| words(image, &image::PLANT_TICKS) > 20);
+    // Its steps began anew, and the drive cycles did not.
+    let image = browser.wait("image", |image| {
+        let ticks = words(image, &image::PLANT_TICKS);
+        let cycles_ms = 10 * image["cycle"].as_u64().unwrap();
+        ticks > 20 && u64::from(ticks) * 4 + 40 < cycles_ms
+    });
     let mut machine = Machine::news_8000();
     machine.web.width_m = 6.0;
     machine.nips.slip = true;
