@@ -85,22 +85,22 @@ assert plc.read_holding_registers(500, count=1).exception_code == 2
 
 /// Likewise.
 fn tokio_modbus(address: SocketAddr) {
+    fn good<T>(answer: tokio_modbus::Result<T>) -> T {
+        answer.expect("an answer").expect("no exception")
+    }
     let mut plc = sync::tcp::connect(address).expect("it connects");
     let words = [1234, 123];
-    plc.write_multiple_registers(16, &words).unwrap().unwrap();
-    assert_eq!(plc.read_holding_registers(16, 2).unwrap().unwrap(), words);
-    plc.write_single_register(17, 124).unwrap().unwrap();
-    plc.write_single_coil(16 * 17, true).unwrap().unwrap();
-    plc.write_multiple_coils(16 * 17, &[false; 3])
-        .unwrap()
-        .unwrap();
-    let bits = plc.read_coils(16 * 17, 3).unwrap().unwrap();
-    assert_eq!(bits, [false; 3]);
-    assert_eq!(plc.read_discrete_inputs(0, 40).unwrap().unwrap().len(), 40);
-    assert_eq!(plc.read_input_registers(0, 65).unwrap().unwrap().len(), 65);
-    plc.masked_write_register(17, 0, 150).unwrap().unwrap();
+    good(plc.write_multiple_registers(16, &words));
+    assert_eq!(good(plc.read_holding_registers(16, 2)), words);
+    good(plc.write_single_register(17, 124));
+    good(plc.write_single_coil(16 * 17, true));
+    good(plc.write_multiple_coils(16 * 17, &[false; 3]));
+    assert_eq!(good(plc.read_coils(16 * 17, 3)), [false; 3]);
+    assert_eq!(good(plc.read_discrete_inputs(0, 40)).len(), 40);
+    assert_eq!(good(plc.read_input_registers(0, 65)).len(), 65);
+    good(plc.masked_write_register(17, 0, 150));
     let exchanged = plc.read_write_multiple_registers(16, 2, 16, &[1000]);
-    assert_eq!(exchanged.unwrap().unwrap(), [1000, 150]);
-    let refused = plc.read_holding_registers(500, 1).unwrap();
+    assert_eq!(good(exchanged), [1000, 150]);
+    let refused = plc.read_holding_registers(500, 1).expect("an answer");
     assert_eq!(refused, Err(ExceptionCode::IllegalDataAddress));
 }
