@@ -98,6 +98,8 @@ operators!(Add add +, Sub sub -, Mul mul *);
 
 #[cfg(test)]
 mod tests {
+    // places are moved, not computed
+    #![allow(clippy::float_cmp)]
     use super::*;
 
     #[test]
