@@ -23,6 +23,8 @@ const START: Duration = Duration::from_secs(60);
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Between two looks.
 const PAUSE: Duration = Duration::from_millis(50);
+/// What is where it was so long ago keeps still.
+const STILL: Duration = Duration::from_millis(20);
 
 /// A running browser without a window; it ends when dropped.
 pub struct Chromium {
@@ -236,7 +238,21 @@ impl Page {
              return e === at || e.contains(at) ? [r.x + r.width / 2, r.y + r.height / 2] : null; }})()"
         );
         self.until(&format!("{look} !== null"));
-        let place = self.eval(&look);
+        // a page that is being laid out moves things away from under the mouse
+        let mut place = self.eval(&look);
+        let began = Instant::now();
+        loop {
+            thread::sleep(STILL);
+            let again = self.eval(&look);
+            if again == place && !again.is_null() {
+                break;
+            }
+            assert!(
+                began.elapsed() < PATIENCE,
+                "does not keep still: {expression}"
+            );
+            place = again;
+        }
         for kind in ["mousePressed", "mouseReleased"] {
             self.call(
                 "Input.dispatchMouseEvent",

@@ -50,8 +50,15 @@ fn a_trigger_holds_what_was_before_it() {
     let mut bench = Bench::start();
     bench.thread();
     bench.show("trends");
+    // where it is drawn, nothing moves any more under the mouse
+    bench
+        .page
+        .until("document.querySelector('.u-wrap') !== null");
     bench.page.press("10 s");
     bench.page.press("Speed");
+    bench
+        .page
+        .until("document.querySelector('.presets [aria-pressed=true]')?.textContent === 'Speed'");
     bench.page.choose("Signal", "v_web");
     bench.page.choose("Edge", "rises");
     bench.page.fill("Level", &LEVEL.to_string());
