@@ -17,6 +17,8 @@ use super::{Map, Outcome, hex};
 
 /// A reply begins within milliseconds; this long without one there is none.
 const PATIENCE: Duration = Duration::from_millis(300);
+/// A line that was just opened may take longer: QEMU looks once a second whether anybody is at its pseudoterminal.
+const OPENING: Duration = Duration::from_secs(2);
 /// A silence that ends a frame for everybody.
 const SILENCE: Duration = Duration::from_millis(40);
 
@@ -25,6 +27,8 @@ pub struct Line {
     port: Box<dyn SerialPort>,
     station: u8,
     scratch: u16,
+    /// How long a reply is waited for.
+    patience: Duration,
 }
 
 type Case = (
@@ -213,13 +217,15 @@ pub fn run(
     map: &Map,
     mut keep: impl FnMut(Outcome),
 ) -> Result<()> {
-    let port = serialport::new(path, baud).timeout(PATIENCE).open();
+    let port = serialport::new(path, baud).open();
     let mut line = Line {
         port: port.with_context(|| format!("cannot open the serial line {path}"))?,
         station,
         scratch: map.scratch,
+        patience: OPENING,
     };
     let held = line.held();
+    line.patience = PATIENCE;
     for (id, source, sent, wanted, case) in CASES {
         thread::sleep(SILENCE);
         // what a case has left behind is not the next one's
@@ -271,7 +277,7 @@ impl Line {
     /// All that comes until it is silent.
     fn heard(&mut self) -> Result<Vec<u8>, String> {
         let (mut heard, mut bytes) = (Vec::new(), [0; 512]);
-        let mut patience = PATIENCE;
+        let mut patience = self.patience;
         loop {
             self.port
                 .set_timeout(patience)
