@@ -38,6 +38,25 @@ fn every_core_computes_the_same_bits() {
     }
 }
 
+/// The boards copy memory by code of their own.
+#[test]
+fn every_core_copies_bytes_as_this_pc_does() {
+    let (times, hash) = model_core::twin::copies();
+    for core in CORES {
+        let there = Twin::on(core)
+            .unwrap()
+            .run(&["copy", "bytes", "all"])
+            .unwrap();
+        assert_eq!(there.len(), 1);
+        assert_eq!(
+            (there[0].steps, there[0].hash),
+            (times, hash),
+            "{}",
+            core.name
+        );
+    }
+}
+
 #[test]
 fn a_development_build_computes_the_same_bits() {
     let program = setup::development_twin().unwrap();

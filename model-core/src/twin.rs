@@ -7,6 +7,8 @@
 //! loses traction, brakes down to standstill, stall tension held, a web break. Nothing is fed back: the torques
 //! follow from the machine's description by the balances of each roll, so that every scalar gets the same ones.
 
+use core::hint::black_box;
+
 use heapless::Vec;
 
 use crate::drive::DRIVE_PERIOD_MS;
@@ -469,6 +471,30 @@ pub fn commands(machine: &Machine, cycle: u32) -> Commands {
         commands.set_word(signal, drives);
     }
     commands
+}
+
+/// Longest of [`copies`], bytes: some rounds of eight words, and a rest of every length.
+const LONGEST_COPY: usize = 100;
+/// Bytes of two words.
+const PLACES: usize = 8;
+
+/// Copies bytes between all places of two words, of all lengths up to [`LONGEST_COPY`]; gives how many times, and a hash of
+/// all that stands where they were copied to and beside it. For boards that copy memory by code of their own.
+pub fn copies() -> (u32, u32) {
+    let source: [u8; LONGEST_COPY + PLACES] = core::array::from_fn(|i| (i * 37 + 11) as u8);
+    let (mut times, mut hash) = (0, 0_u32);
+    for (from, to) in (0..PLACES).flat_map(|from| (0..PLACES).map(move |to| (from, to))) {
+        for length in 0..=LONGEST_COPY {
+            let length = black_box(length);
+            let mut target = [0; LONGEST_COPY + PLACES];
+            target[to..to + length].copy_from_slice(&source[from..from + length]);
+            for byte in black_box(target) {
+                hash = hash.wrapping_mul(31).wrapping_add(byte.into());
+            }
+            times += 1;
+        }
+    }
+    (times, hash)
 }
 
 #[cfg(test)]

@@ -79,6 +79,11 @@ fn run(line: &str) -> Result<(), Error> {
     else {
         return Err(Error::Unknown);
     };
+    if (what, scalar, which) == ("copy", "bytes", "all") {
+        let (times, hash) = twin::copies();
+        hprintln!("copies {} {:08x}", times, hash);
+        return Ok(());
+    }
     let Some((_, runs)) = SCALARS.iter().find(|(name, _)| *name == scalar) else {
         return Err(Error::Unknown);
     };
