@@ -154,16 +154,11 @@ fn main() -> ! {
 fn reset() -> Reset {
     let flags = pac::RCC.rsr().read();
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
-    // The pin's flag is set by every reset of the chip, so it says something only alone.
-    if flags.porrstf() || flags.borrstf() {
-        Reset::Power
-    } else if flags.iwdg1rstf() {
-        Reset::Watchdog
-    } else if flags.sftrstf() {
-        Reset::Program
-    } else {
-        Reset::Other
-    }
+    Reset::of(
+        flags.porrstf() || flags.borrstf(),
+        flags.iwdg1rstf(),
+        flags.sftrstf(),
+    )
 }
 
 #[embassy_executor::task]

@@ -36,6 +36,22 @@ pub enum Reset {
     Other,
 }
 
+impl Reset {
+    /// From the chip's flags: power came or sagged, the independent watchdog, the program. That of the reset pin is not
+    /// asked for: every reset of the chip sets it, so it says something only alone.
+    pub fn of(power: bool, watchdog: bool, program: bool) -> Self {
+        if power {
+            Self::Power
+        } else if watchdog {
+            Self::Watchdog
+        } else if program {
+            Self::Program
+        } else {
+            Self::Other
+        }
+    }
+}
+
 /// How this start has come about; called once.
 pub fn started(reset: Reset) -> Started {
     let noted = record::noted().unwrap_or_default();
