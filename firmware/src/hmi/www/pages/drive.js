@@ -13,11 +13,11 @@ const ELSEWHERE = /^(fault_|bus_delay|autotune_|plant_|drive_|logic_|trajectory)
 
 function Values({ list, title }) {
   return list.length
-    ? html`<section class="card"><h2>${title}</h2><table class="values"><tbody>${list.map(
+    ? html`<section class="card"><h2>${title}</h2><div class="scroll"><table class="values"><tbody>${list.map(
         (s) =>
           html`<tr key=${s.name}><td><code>${s.name}</code><small>${s.description}</small></td><td class="n">
             <${Num} name=${s.name} /></td></tr>`,
-      )}</tbody></table></section>`
+      )}</tbody></table></div></section>`
     : null;
 }
 
@@ -40,11 +40,11 @@ export default function Drive() {
       <div class="stack">
         ${
           gains?.loops?.length && tab === 'winder'
-            ? html`<section class="card"><h2>Regulators</h2><table class="values"><thead><tr><th>Loop</th>
+            ? html`<section class="card"><h2>Regulators</h2><div class="scroll"><table class="values"><thead><tr><th>Loop</th>
               <th class="n">Gain</th><th class="n">Integral time</th><th>From</th></tr></thead><tbody>
               ${gains.loops.map((l) => html`<tr key=${l.name}><td>${sentence(l.name)}</td><td class="n"><b>
                 ${figure(l.gain ?? NaN, l.gain < 10 ? 3 : 0)}</b> ${l.unit}</td><td class="n"><b>
-                  ${figure(l.time_s ?? NaN, 3)}</b> s</td><td>${l.source}</td></tr>`)}</tbody></table>
+                  ${figure(l.time_s ?? NaN, 3)}</b> s</td><td>${l.source}</td></tr>`)}</tbody></table></div>
               <p class="quiet">At the present diameters.</p></section>`
             : null
         }
