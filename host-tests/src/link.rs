@@ -4,7 +4,7 @@
 //! commands, one request each, so that what belongs together travels together. The faults that somebody else puts in
 //! stand behind its commands and are none of its business.
 
-use std::net::SocketAddr;
+use std::net::{SocketAddr, ToSocketAddrs};
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
@@ -13,6 +13,13 @@ use tokio_modbus::client::sync::{self, Reader as _, Writer as _};
 
 /// An answer takes milliseconds; this long without one, the simulator is gone.
 const TIMEOUT: Duration = Duration::from_secs(2);
+
+/// The place of a Modbus TCP server, as it is given on the command line.
+pub fn resolve(address: &str) -> Result<SocketAddr> {
+    let wrong = || format!("{address} is not HOST:PORT, as 127.0.0.1:502");
+    let found = address.to_socket_addrs().with_context(wrong)?.next();
+    found.with_context(wrong)
+}
 
 /// A connection to a simulator.
 pub struct Link {

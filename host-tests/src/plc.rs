@@ -13,6 +13,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
+use model_core::desk::{ALARM_BITS, STATES};
 use model_core::drive::DRIVE_PERIOD_MS;
 use model_core::image::{self, Commands, Feedback, Image, Kind, Signal};
 use model_core::logic::{Fault, Mode, Refusal, command, status};
@@ -481,6 +482,19 @@ pub fn wind_in_lockstep<const SPANS: usize>(
         samples.push(sample);
     }
     Ok(samples)
+}
+
+/// What a winder PLC shows its operator: its state, and the alarms that stand.
+pub fn shown(commands: &Commands) -> (&'static str, Vec<&'static str>) {
+    let state = usize::from(commands.word(&image::PLC_STATE));
+    let alarms = commands.word(&image::PLC_ALARMS);
+    let standing = ALARM_BITS
+        .iter()
+        .filter(|bit| alarms >> bit.number & 1 == 1);
+    (
+        STATES.get(state).copied().unwrap_or("unknown state"),
+        standing.map(|bit| bit.name).collect(),
+    )
 }
 
 /// Winds a set on the simulator at `address`, which runs at `pace` times real time; shows the observer a sample

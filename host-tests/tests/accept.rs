@@ -17,7 +17,7 @@ use host_tests::accept::matrix::{golden, rows, table};
 use host_tests::accept::seeds::SEEDS;
 use host_tests::accept::world::{LIMIT_S, Lockstep};
 use host_tests::accept::{Outcome, accept, wired};
-use host_tests::lesson::{Play, shipped};
+use host_tests::lesson::{Lesson, Play, shipped};
 use host_tests::plc::{Plc, Recipe};
 use model_core::image::{Commands, Image};
 use model_core::machine::Machine;
@@ -251,18 +251,23 @@ fn a_report_is_well_formed_whatever_it_says() {
     assert!(!html.contains("src=") && !html.contains("@import"));
 }
 
+/// A lesson's own solution gets all points.
+#[track_caller]
+fn solves<C: Controller>(lesson: &Lesson, mut play: Play<C>) {
+    for act in &lesson.solution {
+        play.act(act).unwrap();
+    }
+    let told: Vec<_> = play
+        .scores()
+        .map(|(s, earned)| (s.what.clone(), earned))
+        .collect();
+    assert_eq!(play.points(), 100, "{}: {told:?}", lesson.name);
+}
+
 #[test]
 fn lessons_are_solved_by_their_solutions_and_not_by_waiting() {
     for lesson in shipped().unwrap() {
-        let mut play = Play::new(&lesson).unwrap();
-        for act in &lesson.solution {
-            play.act(act).unwrap();
-        }
-        let told: Vec<_> = play
-            .scores()
-            .map(|(s, earned)| (s.what.clone(), earned))
-            .collect();
-        assert_eq!(play.points(), 100, "{}: {told:?}", lesson.name);
+        solves(&lesson, Play::new(&lesson).unwrap());
         let mut idle = Play::new(&lesson).unwrap();
         while !idle.is_over() {
             idle.tick().unwrap();
@@ -294,15 +299,7 @@ impl Controller for AtDesk {
 fn lessons_are_solved_at_the_panel_as_at_a_plc() {
     for lesson in shipped().unwrap() {
         let panel = AtDesk(Panel::new(&Machine::news_8000()));
-        let mut play = Play::at_desk_of(panel, &lesson).unwrap();
-        for act in &lesson.solution {
-            play.act(act).unwrap();
-        }
-        let told: Vec<_> = play
-            .scores()
-            .map(|(s, earned)| (s.what.clone(), earned))
-            .collect();
-        assert_eq!(play.points(), 100, "{}: {told:?}", lesson.name);
+        solves(&lesson, Play::at_desk_of(panel, &lesson).unwrap());
     }
 }
 

@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use model_core::drive::DRIVE_PERIOD_MS;
-use model_core::image::{Commands, Feedback, Image};
+use model_core::image::{Commands, Direction, Feedback, Image, Section};
 use model_core::machine::Machine;
 
 use super::controller::Controller;
-use super::world::{own_words, stretches};
+use super::world::{put_own, stretches};
 use crate::interrupt;
 use crate::link::Link;
 
@@ -39,7 +39,8 @@ pub fn run(
     mut tell: impl FnMut(Event<'_>),
 ) -> Result<String> {
     let period = Duration::from_millis(plc.period() * u64::from(DRIVE_PERIOD_MS));
-    let theirs = plc_words();
+    let theirs =
+        stretches(|s| s.direction == Direction::Command && s.section != Section::Simulator);
     let mut image = Image {
         commands: Commands::of(&Machine::news_8000()),
         feedback: Feedback::default(),
@@ -90,21 +91,11 @@ fn exchange(
 ) -> Result<()> {
     image.feedback = link.read()?;
     // the desk's words, which others write
-    let seen = link.read_commands()?;
-    for (from, words) in own_words() {
-        let stretch = from..from + words;
-        commands.words[stretch.clone()].copy_from_slice(&seen.words[stretch]);
-    }
+    put_own(&link.read_commands()?, commands);
     image.commands = *commands;
     plc.cycle(image, commands);
     for &(from, words) in theirs {
         link.write_at(from, &commands.words[from..from + words])?;
     }
     Ok(())
-}
-
-/// The words of the commands that are the PLC's, as stretches of the block.
-fn plc_words() -> Vec<(usize, usize)> {
-    use model_core::image::{Direction, Section};
-    stretches(|s| s.direction == Direction::Command && s.section != Section::Simulator)
 }

@@ -79,7 +79,7 @@ pub fn stretches(of: impl Fn(&image::Signal) -> bool) -> Vec<(usize, usize)> {
 }
 
 /// Puts the simulator's own words of one block into another.
-fn put_own(own: &Commands, into: &mut Commands) {
+pub fn put_own(own: &Commands, into: &mut Commands) {
     for (from, words) in own_words() {
         let stretch = from..from + words;
         into.words[stretch.clone()].copy_from_slice(&own.words[stretch]);

@@ -3,7 +3,6 @@
 use std::env;
 use std::fs;
 use std::io::{self, Write};
-use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -14,6 +13,7 @@ use crate::accept::attend::Page;
 use crate::accept::controller::{Controller, StPlc};
 use crate::accept::world::{self, Live, Lockstep};
 use crate::accept::{Outcome, accept, matrix};
+use crate::link::resolve;
 
 /// Which PLC, and where the report goes.
 #[derive(Clone, Debug, clap::Args)]
@@ -145,12 +145,6 @@ fn attend(page: &str, address: &str, out: &Path) -> Result<ExitCode> {
             report.display()
         );
     }
-}
-
-fn resolve(address: &str) -> Result<SocketAddr> {
-    let wrong = || format!("{address} is not HOST:PORT");
-    let found = address.to_socket_addrs().with_context(wrong)?.next();
-    found.with_context(wrong)
 }
 
 fn what(address: &str) -> String {

@@ -1,15 +1,15 @@
 //! `winder conformance`
 
 use std::env;
-use std::net::{SocketAddr, ToSocketAddrs};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use board_host::STATION;
 
 use crate::conformance::peers::{self, Column};
 use crate::conformance::{self, Map, Outcome, Server, serial};
 use crate::interrupt;
+use crate::link::resolve;
 use crate::namespace::{self, Side};
 use crate::setup;
 use crate::simulator::{Board, Network, Options, Simulator};
@@ -146,13 +146,4 @@ fn compare() -> Result<ExitCode> {
         peers::table(&columns)
     );
     Ok(ExitCode::SUCCESS)
-}
-
-fn resolve(name: &str) -> Result<SocketAddr> {
-    let mut addresses = name
-        .to_socket_addrs()
-        .with_context(|| format!("{name} is not HOST:PORT, as 127.0.0.1:502"))?;
-    addresses
-        .next()
-        .with_context(|| format!("{name} has no address"))
 }

@@ -7,11 +7,11 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use model_core::desk::{ALARM_BITS, STATES};
 use model_core::image;
 
 use crate::interrupt;
 use crate::lesson::{Act, Lesson, Play, TICK_S, shipped};
+use crate::plc::shown;
 
 /// The state is told so often, s.
 const TELL_S: f64 = 5.0;
@@ -116,13 +116,7 @@ fn tell(play: &Play) -> io::Result<()> {
     let Some(seen) = play.image() else {
         return Ok(());
     };
-    let state = usize::from(seen.commands.word(&image::PLC_STATE));
-    let state = STATES.get(state).copied().unwrap_or("unknown state");
-    let alarms = seen.commands.word(&image::PLC_ALARMS);
-    let alarms = ALARM_BITS
-        .iter()
-        .filter(|bit| alarms >> bit.number & 1 == 1);
-    let alarms: Vec<_> = alarms.map(|bit| bit.name).collect();
+    let (state, alarms) = shown(&seen.commands);
     let value = |signal| seen.feedback.get::<f64>(signal);
     writeln!(
         io::stdout(),

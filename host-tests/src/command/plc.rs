@@ -1,16 +1,16 @@
 //! `winder plc`
 
 use std::fs;
-use std::net::ToSocketAddrs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-use model_core::desk::{ALARM_BITS, STATES};
-use model_core::image::{self, Image};
+use model_core::image;
 
 use crate::accept::controller::{REFERENCE, StPlc};
 use crate::accept::wired::{self, Event};
+use crate::link::resolve;
+use crate::plc::shown;
 
 /// Which program, and where.
 #[derive(Clone, Debug, clap::Args)]
@@ -34,10 +34,9 @@ pub fn main(args: &Args) -> Result<ExitCode> {
         None => ("the reference winder PLC".to_owned(), REFERENCE.to_owned()),
     };
     let plc = StPlc::new(&text).with_context(|| name.clone())?;
-    let wrong = || format!("{} is not HOST:PORT", args.address);
-    let address = args.address.to_socket_addrs().with_context(wrong)?.next();
+    let address = resolve(&args.address)?;
     let mut last = None;
-    let why = wired::run(address.with_context(wrong)?, plc, |event| match event {
+    let why = wired::run(address, plc, |event| match event {
         Event::Connected => println!("{name} is wired to {}", args.address),
         Event::Lost(error) => eprintln!("winder: {error:#}; trying again"),
         Event::Cycle(image) => {
@@ -47,29 +46,11 @@ pub fn main(args: &Args) -> Result<ExitCode> {
             ));
             if now != last {
                 last = now;
-                println!("{}", shown(image));
+                let (state, alarms) = shown(&image.commands);
+                println!("{}", [&[state], &alarms[..]].concat().join(", "));
             }
         }
     })?;
     eprintln!("winder: the program has stopped: {name}, {why}");
     Ok(ExitCode::FAILURE)
-}
-
-/// What the program shows its operator.
-fn shown(image: &Image) -> String {
-    let state = usize::from(image.commands.word(&image::PLC_STATE));
-    let alarms = image.commands.word(&image::PLC_ALARMS);
-    let alarms = ALARM_BITS
-        .iter()
-        .filter(|bit| alarms >> bit.number & 1 == 1);
-    let mut text = STATES
-        .get(state)
-        .copied()
-        .unwrap_or("unknown state")
-        .to_owned();
-    for bit in alarms {
-        text += ", ";
-        text += bit.name;
-    }
-    text
 }
