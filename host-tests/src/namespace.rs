@@ -10,6 +10,7 @@
 //! kernel that gives users namespaces of their own.
 
 use std::env;
+use std::fs;
 use std::net::Ipv4Addr;
 use std::process::{Command, ExitStatus, Stdio};
 
@@ -24,6 +25,10 @@ const INSIDE: &str = "WINDER_NAMESPACE";
 pub const TAP: &str = "winder0";
 /// The host's own address there: the guest's gateway, as on QEMU's user network.
 pub const HOST: &str = "10.0.2.2/24";
+/// How many ended connections the kernel keeps in mind (TIME-WAIT), a minute each: at a thousand a second they would use
+/// up the ports that connections are made from, and looking for a free one would take longer and longer.
+const ENDED: &str = "/proc/sys/net/ipv4/tcp_max_tw_buckets";
+const KEPT: &str = "1000";
 /// The guest's address.
 pub const GUEST: Ipv4Addr = Ipv4Addr::new(10, 0, 2, 15);
 
@@ -50,6 +55,7 @@ pub fn enter(arguments: &[String]) -> Result<Side> {
         ] {
             setup::run(Command::new("ip").args(line.split(' ')))?;
         }
+        fs::write(ENDED, KEPT).with_context(|| format!("cannot write {ENDED}"))?;
         return Ok(Side::Inside);
     }
     setup::ip()?;
