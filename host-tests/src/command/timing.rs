@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Result, ensure};
 use model_core::image::{
     DRIVE_JITTER_MAX, DRIVE_OVERRUNS, DRIVE_TIME_MAX, LOGIC_OVERRUNS, PLANT_JITTER_MAX,
-    PLANT_OVERRUNS, PLANT_TICKS, PLANT_TIME_MAX, TRAJECTORY,
+    PLANT_OVERRUNS, PLANT_TICKS, PLANT_TIME_MAX, Signal, TRAJECTORY,
 };
 
 use crate::interrupt::Interrupted;
@@ -22,7 +22,7 @@ pub struct Args {
     /// Core: M7, M4F or M3; may be given several times [default: all]
     #[arg(long = "core", value_name = "NAME")]
     cores: Vec<String>,
-    /// Load: idle, "polling PLC" or "packet storm"; may be given several times [default: all]
+    /// Load, by a name that the table has, like "polling PLC"; may be given several times [default: all]
     #[arg(long = "load", value_name = "NAME")]
     loads: Vec<String>,
     /// Run so many activations of the plant's task under the polling PLC, and ask the firmware what it has noticed
@@ -110,12 +110,16 @@ pub fn tell(outcome: &Outcome, command: &str) -> bool {
     matches!(outcome, Outcome::Same | Outcome::OtherCompiler(_))
 }
 
+/// What the tasks with a period have counted.
+const OVERRUNS: [&Signal; 3] = [&PLANT_OVERRUNS, &DRIVE_OVERRUNS, &LOGIC_OVERRUNS];
+
 /// A long run: the first load whose PLC asks, on each core.
 fn endure(firmware: &Firmware, cores: &[&Core], ticks: u64) -> Result<ExitCode> {
     let mut none = true;
     for core in cores {
-        let endured = firmware.endure(core, &LOADS[POLLING], ticks, |ticks| {
-            eprintln!("winder: {ticks} ticks");
+        let endured = firmware.endure(core, &LOADS[POLLING], ticks, |ticks, feedback| {
+            let overruns = OVERRUNS.map(|signal| feedback.word(signal));
+            eprintln!("winder: {ticks} ticks, overruns {overruns:?}");
         })?;
         println!("{}: {}", core.name, endured.done);
         let f = &endured.feedback;
@@ -136,9 +140,7 @@ fn endure(firmware: &Firmware, cores: &[&Core], ticks: u64) -> Result<ExitCode> 
             );
         }
         println!("  logic: {} overruns", f.word(&LOGIC_OVERRUNS));
-        none &= [&PLANT_OVERRUNS, &DRIVE_OVERRUNS, &LOGIC_OVERRUNS]
-            .iter()
-            .all(|signal| f.word(signal) == 0);
+        none &= OVERRUNS.iter().all(|signal| f.word(signal) == 0);
     }
     Ok(if none {
         ExitCode::SUCCESS

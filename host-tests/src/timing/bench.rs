@@ -1,11 +1,13 @@
-//! The firmware in QEMU, its virtual time held at whole milliseconds, its network cable in our hands.
+//! The firmware in QEMU, its virtual time held at whole milliseconds, its network cable and its serial line in our
+//! hands.
 //!
 //! Not here: what is sent to it, and what its numbers mean.
 //!
 //! Virtual time is a count of instructions, and stands still while [`Bench`] has the turn. Frames that are sent then
 //! are in the guest's receive FIFO before it goes on: a filter in QEMU shows every frame that has passed, and behind
 //! them follows one that the guest's Ethernet controller does not take, since it is for somebody else. When that one
-//! shows, all before it have arrived. So every frame comes at the same instruction in every run.
+//! shows, all before it have arrived. So every frame comes at the same instruction in every run. A byte on the serial
+//! line is as sure: QEMU looks at all that is ready before it looks for the next such frame.
 
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::fd::OwnedFd;
@@ -29,6 +31,25 @@ use crate::twin::Core;
 
 /// An Ethernet frame without its checksum.
 pub type Frame = Vec<u8>;
+
+/// What goes to the guest in a beat, or has come from it.
+#[derive(Clone, Debug, Default)]
+pub struct Traffic {
+    /// On the network cable.
+    pub frames: Vec<Frame>,
+    /// On the serial line; to the guest one byte at most, since its UART holds no more.
+    pub serial: Vec<u8>,
+}
+
+impl Traffic {
+    /// Nothing but frames.
+    pub fn of(frames: Vec<Frame>) -> Self {
+        Self {
+            frames,
+            ..Self::default()
+        }
+    }
+}
 
 /// QEMU takes a moment to start, more on a busy PC.
 const START: Duration = Duration::from_secs(60);
@@ -65,6 +86,7 @@ pub struct Bench {
     child: Child,
     gate: BufReader<UnixStream>,
     wire: UnixStream,
+    line: UnixStream,
     /// What QEMU shows of the frames that have passed.
     passed: BufReader<UnixStream>,
     /// The beginning of a frame that the guest is sending.
@@ -88,7 +110,7 @@ impl Bench {
         static BENCHES: AtomicU32 = AtomicU32::new(0);
         let number = BENCHES.fetch_add(1, Ordering::Relaxed);
         let name = |what| format!("winder-{}-{number}-{what}", std::process::id());
-        let (gate, passed) = (name("gate"), name("passed"));
+        let (gate, passed, line) = (name("gate"), name("passed"), name("line"));
         let listen = |name: &str| -> io::Result<UnixListener> {
             let listener = UnixListener::bind_addr(&SocketAddr::from_abstract_name(name)?)?;
             listener.set_nonblocking(true)?;
@@ -96,6 +118,7 @@ impl Bench {
         };
         let gate_listener = listen(&gate).context("cannot listen for QEMU's plugin")?;
         let passed_listener = listen(&passed).context("cannot listen for QEMU's filter")?;
+        let line_listener = listen(&line).context("cannot listen for QEMU's serial line")?;
         let (wire, theirs) = UnixStream::pair().context("cannot make a network cable")?;
         wire.set_nonblocking(true)?;
 
@@ -124,7 +147,10 @@ impl Bench {
             .args(["-icount", "shift=1,sleep=off"])
             .args(["-plugin", &arguments])
             .args(["-semihosting-config", "enable=on,target=native"])
-            .args(["-serial", "null", "-nic", "socket,id=wire,fd=0"])
+            .args(["-serial", "null", "-serial", "chardev:line"])
+            .args(["-nic", "socket,id=wire,fd=0"])
+            .arg("-chardev")
+            .arg(format!("socket,id=line,path={line},abstract=on"))
             .arg("-chardev")
             .arg(format!("socket,id=passed,path={passed},abstract=on"))
             .arg("-object")
@@ -140,6 +166,8 @@ impl Bench {
             .stderr(Stdio::piped())
             .process_group(0);
         let mut child = command.spawn().context("cannot start QEMU")?;
+        let line = accept(&line_listener, &mut child)?;
+        line.set_nonblocking(true)?;
         let passed = accept(&passed_listener, &mut child)?;
         let gate = accept(&gate_listener, &mut child)?;
         gate.set_read_timeout(Some(PATIENCE))?;
@@ -148,6 +176,7 @@ impl Bench {
             child,
             gate: BufReader::new(gate),
             wire,
+            line,
             passed: BufReader::new(passed),
             partial: Vec::new(),
         };
@@ -171,7 +200,7 @@ impl Bench {
         self.say("report")?;
         let mut report = Report::default();
         loop {
-            let line = self.line()?;
+            let line = self.answer()?;
             if line.is_empty() {
                 return Ok(report);
             }
@@ -179,34 +208,43 @@ impl Bench {
         }
     }
 
-    /// The frames that the guest has sent.
-    pub fn received(&mut self) -> Result<Vec<Frame>> {
-        let mut buffer = [0; 1 << 16];
-        loop {
-            match self.wire.read(&mut buffer) {
-                Ok(0) => bail!("QEMU has let go of the network cable"),
-                Ok(n) => self.partial.extend_from_slice(&buffer[..n]),
-                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                Err(error) => return Err(error).context("cannot read the network cable"),
-            }
-        }
-        let mut frames = Vec::new();
+    /// What the guest has sent.
+    pub fn received(&mut self) -> Result<Traffic> {
+        read_all(&mut self.wire, &mut self.partial).context("the network cable")?;
+        let mut traffic = Traffic::default();
+        read_all(&mut self.line, &mut traffic.serial).context("the serial line")?;
         while let Some((length, rest)) = self.partial.split_first_chunk() {
             let length = u32::from_be_bytes(*length) as usize;
             let Some(frame) = rest.get(..length) else {
                 break;
             };
-            frames.push(frame.to_vec());
+            traffic.frames.push(frame.to_vec());
             self.partial.drain(..size_of::<u32>() + length);
         }
-        Ok(frames)
+        Ok(traffic)
     }
 
-    /// Frames for the guest: when this returns they have arrived.
-    pub fn send(&mut self, frames: &[Frame]) -> Result<()> {
-        if frames.is_empty() {
-            return Ok(());
+    /// Something for the guest: when this returns it has arrived.
+    pub fn send(&mut self, traffic: &Traffic) -> Result<()> {
+        /// QEMU notes in one round that the UART has room, hears in the next one that there is a byte, and has given it
+        /// when a third one begins.
+        const ROUNDS_OF_A_BYTE: usize = 3;
+        let Traffic { frames, serial } = traffic;
+        ensure!(serial.len() <= 1, "{} bytes for one beat", serial.len());
+        self.line
+            .write_all(serial)
+            .context("cannot write to the serial line")?;
+        if !frames.is_empty() || !serial.is_empty() {
+            self.pass_frames(frames)?;
         }
+        for _ in 1..ROUNDS_OF_A_BYTE * serial.len() {
+            self.pass_frames(&[])?;
+        }
+        Ok(())
+    }
+
+    /// Frames, and the one that shows when they have arrived.
+    fn pass_frames(&mut self, frames: &[Frame]) -> Result<()> {
         let mut bytes = Vec::new();
         for frame in frames.iter().map(Vec::as_slice).chain([LAST]) {
             bytes.extend((frame.len() as u32).to_be_bytes());
@@ -237,7 +275,7 @@ impl Bench {
             .context("QEMU does not listen any more")
     }
 
-    fn line(&mut self) -> Result<String> {
+    fn answer(&mut self) -> Result<String> {
         let mut line = String::new();
         let read = self.gate.read_line(&mut line);
         match read {
@@ -249,7 +287,7 @@ impl Bench {
 
     fn wait(&mut self) -> Result<()> {
         interrupt::check()?;
-        let line = self.line()?;
+        let line = self.answer()?;
         ensure!(line == "beat", "the plugin says {line:?}");
         Ok(())
     }
@@ -260,6 +298,19 @@ impl Drop for Bench {
         // it may have ended by itself; then there is nothing to end
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// All that has come by now.
+fn read_all(from: &mut UnixStream, into: &mut Vec<u8>) -> Result<()> {
+    let mut buffer = [0; 1 << 16];
+    loop {
+        match from.read(&mut buffer) {
+            Ok(0) => bail!("QEMU has let go of it"),
+            Ok(n) => into.extend_from_slice(&buffer[..n]),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(()),
+            Err(error) => return Err(error.into()),
+        }
     }
 }
 

@@ -114,13 +114,13 @@ impl Firmware {
     }
 
     /// Runs it for many ticks of the plant under a load, and asks it itself what it has noticed; `tell` hears of the
-    /// progress.
+    /// progress, and what it has noticed until then.
     pub fn endure(
         &self,
         core: &Core,
         kind: &Kind,
         ticks: u64,
-        mut tell: impl FnMut(u64),
+        mut tell: impl FnMut(u64, &Feedback),
     ) -> Result<Endured> {
         /// Often enough to notice what goes on, ms.
         const BEAT: u64 = 10;
@@ -128,6 +128,7 @@ impl Firmware {
         let files = self.files(core)?;
         let elf = Elf::read(&files.firmware)?;
         let mut load = (kind.load)();
+        let asks = || format!("under {} nobody asks the firmware", kind.name);
         let mut bench = Bench::start(&files, core, &elf, Watch::Beats)?;
         let (mut now, end) = (0, ticks * u64::from(PLANT_PERIOD_MS));
         while now < end {
@@ -136,17 +137,13 @@ impl Firmware {
             bench.pass(BEAT)?;
             now += BEAT;
             if now.is_multiple_of(TOLD) {
-                tell(now / u64::from(PLANT_PERIOD_MS));
+                let feedback = load.feedback().with_context(asks)?;
+                tell(now / u64::from(PLANT_PERIOD_MS), feedback);
             }
         }
         let done = load.done()?;
-        let feedback = load
-            .feedback()
-            .with_context(|| format!("under {} nobody asks the firmware", kind.name))?;
-        Ok(Endured {
-            done,
-            feedback: *feedback,
-        })
+        let feedback = *load.feedback().with_context(asks)?;
+        Ok(Endured { done, feedback })
     }
 
     /// Measures it on a core under a load.
