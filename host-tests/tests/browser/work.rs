@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 
+use host_tests::setup;
 use model_core::image::{self, SIGNALS};
 use model_core::logic::{Fault, Mode, status};
 use model_core::machine::Machine;
@@ -199,6 +200,10 @@ fn a_web_break_is_put_in_by_a_click_seen_and_acknowledged() {
     bench.page.until(
         "[...document.querySelectorAll('.scene text')].some((t) => t.textContent === 'Web break')",
     );
+    bench.page.screen(1440, 900, false);
+    bench
+        .page
+        .picture(&setup::scratch("hmi-break.png").expect("a place"));
     bench.show("faults");
     bench.page.press("All sound");
     bench.page.until_text("The machine is sound.");
