@@ -5,6 +5,7 @@
 use std::collections::VecDeque;
 
 use anyhow::{Context, Result, ensure};
+use board_host::STATION;
 use firmware::link::modbus::rtu::checksum;
 use model_core::drive::DRIVE_PERIOD_MS;
 use model_core::image::{FEEDBACK_WORDS, Feedback, HEARTBEAT_PLC, MODE, PLC_COMMAND_WORDS};
@@ -15,9 +16,12 @@ use smoltcp::iface::SocketHandle;
 
 use super::host::Host;
 use super::{Load, Traffic};
+use crate::conformance::frame;
 
 /// Modbus TCP.
 const MODBUS_PORT: u16 = 502;
+/// Any will do: over TCP there is one.
+const UNIT: u8 = 1;
 /// The drive cycle from which on the PLC goes on winding: before its script would stop.
 const WINDING: u32 = 39 * 1000 / DRIVE_PERIOD_MS;
 /// Function codes.
@@ -125,15 +129,9 @@ impl Tcp {
         }
     }
 
-    /// A request: transaction, protocol 0, length, unit 1, and what is asked.
     fn request(&mut self, pdu: &[u8]) {
         self.transaction = self.transaction.wrapping_add(1);
-        let mut frame = self.transaction.to_be_bytes().to_vec();
-        frame.extend([0, 0]);
-        frame.extend((1 + pdu.len() as u16).to_be_bytes());
-        frame.push(1);
-        frame.extend(pdu);
-        self.requests.push_back(frame);
+        self.requests.push_back(frame(self.transaction, UNIT, pdu));
     }
 
     /// Takes a whole answer, if there is one.
@@ -231,8 +229,6 @@ pub struct Serial {
     last: u64,
 }
 
-/// The board's address on its line.
-const STATION: u8 = 1;
 /// Bytes about a PDU: address and checksum.
 const ABOUT: usize = 3;
 /// A silence that ends a frame for the board in QEMU, ms, and one beat more.
